@@ -132,7 +132,6 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     job.begin()
 
     from nutdamp.api import verify, verify_loop
-    from nutdamp.views.simulation import verification_brief
 
     if looped:
         with job.working("verifying"):
@@ -152,7 +151,7 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     with job.working("verifying"):
         verified = verify(plan)
     core = verified.core
-    job.deliver(verified, *([] if verbose else [lambda: verification_brief(plan, core)]))
+    job.deliver(verified, verbose=verbose)
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")

@@ -339,13 +339,14 @@ class Job:
         more: Files | None = None,
         files: Sequence[Output] = (),
         unsaved: Sequence[CannotWrite | None] = (),
+        verbose: bool | None = None,
         **shown: Any,
     ) -> None:
         """Write the files that are requested of a result, and show it, unless a file goes to
         standard output.
 
-        What ``more`` and ``screens`` lack the views of the result make, with the options ``shown``;
-        see `deliver`.
+        What ``more`` and ``screens`` lack the views of the result make, with the options ``shown``,
+        the screen ``verbose`` or not where it can be; see `deliver`.
         """
         from nutdamp.common import results
 
@@ -357,7 +358,8 @@ class Job:
                     results.view, result, what, *names, **shown if what == "data" else {}
                 )
         outputs = [(self.written.get(option), make) for option, make in contents.items()]
-        usual = screens or (partial(results.view, result, "screen", **shown),)
+        look = shown if verbose is None else {**shown, "verbose": verbose}
+        usual = screens or (partial(results.view, result, "screen", **look),)
         failures = [wrong for wrong in unsaved if wrong is not None]
         deliver([*outputs, *files], *usual * (not self.silent), unsaved=failures)
 

@@ -250,13 +250,11 @@ def simulate_command(
 
     from nutdamp.api import simulate
     from nutdamp.planning.simulation import model_warnings
-    from nutdamp.views.simulation import simulation_screen
 
     simulation = simulate(plan, until, flown=real, samples=samples)
     if job.silent:
         job.note(model_warnings(simulation.impulses, simulation.flown))
-    screen = partial(simulation_screen, simulation, verbose=verbose)
-    job.deliver(simulation, screen, more=job.carried(plan, at, simulation.until))
+    job.deliver(simulation, more=job.carried(plan, at, simulation.until), verbose=verbose)
     leave(simulation.verdict.status)
 
 
@@ -312,7 +310,7 @@ def trade_command(
     from nutdamp.files.tabular import make_folder
     from nutdamp.planning.causes import CUT
     from nutdamp.planning.tradeoff import numbered
-    from nutdamp.views.trade import schedule_files, schedule_paths, trade_brief
+    from nutdamp.views.trade import schedule_files, schedule_paths
 
     allowed = allow or (0.0, math.inf)
     for shift in allow:
@@ -333,8 +331,7 @@ def trade_command(
             files = [(path, partial(str, text)) for path, text in named]
         except CannotWrite as wrong:
             unsaved = [wrong]
-    brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
-    job.deliver(traded, *brief, files=files, unsaved=unsaved)
+    job.deliver(traded, files=files, unsaved=unsaved, verbose=verbose)
     judged = [point.verdict.status for _, _, point in numbered(traded.fronts)]
     best = next(
         (status for status in judged if not status.exit_status), judged[0] if judged else None
@@ -384,7 +381,7 @@ def loop_command(
 
     from nutdamp.api import loop
     from nutdamp.files.tabular import write_track
-    from nutdamp.views.loop import loop_screen, stopped, warnings
+    from nutdamp.views.loop import stopped, warnings
     from nutdamp.views.text import text
 
     with job.working("flying"):
@@ -394,9 +391,7 @@ def loop_command(
         job.note(warnings(spacecraft))
     pieces = partial(run.flight.pieces, samples, run.until)
     track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
-    job.deliver(
-        plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at)
-    )
+    job.deliver(plan, more=track | job.carried(plan, at), verbose=verbose)
     if run.stop.fault:
         say(f"nutdamp: {text(stopped(run))}")
     leave(plan.verdict.status)
@@ -442,11 +437,10 @@ def budget_command(
         job.doubt(f"--thresholds: {reading}")
 
     from nutdamp.api import budget
-    from nutdamp.views.loop import budget_screen
 
     with job.working("following cycles"):
         result = budget(spacecraft, pairs, largest=largest, seed=seed)
-    job.deliver(result, partial(budget_screen, result, verbose=verbose))
+    job.deliver(result, verbose=verbose)
     leave(result.status)
 
 
@@ -634,8 +628,6 @@ def disperse_command(
     from nutdamp import api
     from nutdamp.spacecraft.requirements import expect_loop
     from nutdamp.spacecraft.tolerances import expect_dispersions
-    from nutdamp.views.dispersion import dispersion_brief
-    from nutdamp.views.loop_cases import loop_cases_brief
 
     if looped:
         expect_loop(spacecraft)
@@ -645,17 +637,14 @@ def disperse_command(
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)
         return
-    brief: Callable[[], RenderableType]
+    flown: LoopDispersion | Dispersion
     with stoppable() as stopped, job.working("flying"):
         hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
         if plan is None:
-            loops = api.disperse_loop(spacecraft, samples, until=until, remark=job.remark, **hooks)
-            flown: LoopDispersion | Dispersion = loops
-            brief = partial(loop_cases_brief, loops)
+            flown = api.disperse_loop(spacecraft, samples, until=until, remark=job.remark, **hooks)
         else:
-            flown = study = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
-            brief = partial(dispersion_brief, study)
-    job.deliver(flown, *[brief] * (not verbose), unsaved=[flown.unsaved], worst=worst)
+            flown = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
+    job.deliver(flown, unsaved=[flown.unsaved], verbose=verbose, worst=worst)
     if stopped.number is not None and flown.core.done < flown.core.requested:
         say(f"interrupted: {flown.core.done} of {flown.core.requested} cases are done")
         sys.exit(128 + stopped.number)

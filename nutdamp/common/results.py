@@ -7,7 +7,6 @@ A `Plan` thus writes itself as CSV although its module knows no files.
 from __future__ import annotations
 
 from importlib import import_module
-from operator import attrgetter
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -72,13 +71,8 @@ def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
     entry = _entry(result, what)
     if entry is None:
         raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
-    place, *names = entry.split()
-    module, _, function = place.partition(":")
-    keyed = [name.split("=") for name in names if "=" in name]
-    parts = [attrgetter(name)(result) for name in names if "=" not in name]
-    named = {key: attrgetter(name)(result) for key, name in keyed}
-    call = getattr(import_module(f"nutdamp.{module}"), function)
-    return call(*(parts if names else [result]), *arguments, **named, **options)
+    module, _, function = entry.partition(":")
+    return getattr(import_module(f"nutdamp.{module}"), function)(result, *arguments, **options)
 
 
 def has(result: object, what: str) -> bool:

@@ -666,7 +666,7 @@ class Fitted(results.Data, results.Drawn):
 
         Raises BadRequest for a spacecraft that was not read from a file.
         """
-        return str(results.view(self, "text", carried(self.core, at)))
+        return str(results.view(self.core, "text", carried(self.core, at)))
 
     def spacecraft(self, at: float = 0.0) -> Spacecraft:
         """Spacecraft of that file."""
@@ -679,4 +679,4 @@ class Fitted(results.Data, results.Drawn):
 
     def to_dict(self, at: float = 0.0) -> dict[str, Any]:
         """Contents of the file of ``fit --json``."""
-        return finite(results.view(self, "data", carried(self.core, at), self.warnings))
+        return finite(results.view(self, "data", carried(self.core, at)))

@@ -119,7 +119,8 @@ class FiredBlock(NamedTuple):
         """Its numbers as text."""
         if self.many == 1:
             return str(self.first)
-        return f"{self.first}{'–' if self.many == self.last - self.first + 1 else ' … '}{self.last}"
+        between = "–" if self.many == self.last - self.first + 1 else " … "
+        return f"{self.first}{between}{self.last}"
 
 
 def blocks(flight: Flight, until: float, channel: str | None = None) -> list[FiredBlock]:
@@ -209,9 +210,8 @@ def pole_note(flight: Flight) -> str:
     empty where they are those of the file.
     """
     spacecraft = flight.spacecraft
-    return ", principal axes" * (not spacecraft.inertia.aligned) + ", spin about −3" * (
-        spacecraft.spin < 0.0
-    )
+    axes = "" if spacecraft.inertia.aligned else ", principal axes"
+    return f"{axes}, spin about −3" if spacecraft.spin < 0.0 else axes
 
 
 def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:

@@ -310,14 +310,14 @@ class Scene:
 
     def caption(self, now: float) -> str:
         """Text above the frame: name, scheme, time, and the firing, also just after it."""
-        firing = [
-            f"   {'firing' if now <= pulse.end else 'fired'} {number}: {pulse.channel}"
-            for number, pulse in enumerate(self.flight.schedule, start=1)
-            if pulse.start <= now <= pulse.end + HELD * self.timed.pace
-        ]
+        firing = ""
+        for number, pulse in enumerate(self.flight.schedule, start=1):
+            if pulse.start <= now <= pulse.end + HELD * self.timed.pace:
+                word = "firing" if now <= pulse.end else "fired"
+                firing = f"   {word} {number}: {pulse.channel}"
         digits = max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
         name, scheme = map(style.short, (self.flight.spacecraft.name, self.flight.scheme))
-        return f"{name}: {scheme}\nt = {now:.{digits}f} s{firing[-1] if firing else ''}"
+        return f"{name}: {scheme}\nt = {now:.{digits}f} s{firing}"
 
     def pixels(self) -> NDArray[np.uint8]:
         """The frame, (height, width, 3): the changing parts drawn over the fixed ones."""

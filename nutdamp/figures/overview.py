@@ -17,7 +17,7 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.views.parts import angle_names, angle_texts
+from nutdamp.views.parts import direction_columns
 from nutdamp.views.text import steering
 from nutdamp.views.verdict import stated
 
@@ -104,9 +104,9 @@ def title(flight: Flight) -> str:
     goal = spacecraft.goal.axis
     turn = ""
     if goal is not None:
-        angles = zip(angle_names(spacecraft), angle_texts(spacecraft, goal), strict=True)
         target = ", ".join(
-            f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles
+            f"{column.heading} {column.shown(goal).rstrip('0').rstrip('.')}°"
+            for column in direction_columns(spacecraft)
         )
         turn = f"H turned {style.angle(spacecraft.to_turn)} to the target, {target}\n"
     result = f"nutation {swings}{style.angle(spacecraft.nutation)} → {style.angle(left.nutation)}"
@@ -257,9 +257,8 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         first = group[0] + 1
         last = group[-1] + 1
         middle = refined[group[len(group) // 2]]
-        text = f"{'firing ' * (first == 1)}{first}" + (
-            f"\N{EN DASH}{last}" if first != last else ""
-        )
+        numbers = str(first) if first == last else f"{first}\N{EN DASH}{last}"
+        text = f"firing {numbers}" if first == 1 else numbers
         style.add(axes, text, middle[len(middle) // 2], FIRED)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
@@ -391,7 +390,7 @@ def firings_height(flight: Flight) -> list[float]:
     nothing fires.
     """
     rows = len(geometry.channels_fired(flight))
-    return [0.3 + 0.36 * rows] * bool(rows)
+    return [0.3 + 0.36 * rows] if rows else []
 
 
 def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
@@ -499,9 +498,9 @@ def firings(axes: Axes, flight: Flight, until: float) -> None:
         _bar(axes, flight, block, row)
     axes.set_yticks(list(rows.values()), list(rows))
     axes.grid(axis="x")
-    notes = ["effective on-times, not the commands"] * any(
-        pulse.through_valve for pulse in flight.schedule
-    )
+    notes = []
+    if any(pulse.through_valve for pulse in flight.schedule):
+        notes.append("effective on-times, not the commands")
     if any(pulse.channel == STEERABLE for pulse in flight.schedule):
         notes.append("angles: torque from body axis +1")
     axes.set_title("; ".join(notes), loc="right", **style.NOTE)

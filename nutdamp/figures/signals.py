@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from nutdamp.estimation.results import Estimate
+    from nutdamp.estimation.results import Estimate, Fitted
     from nutdamp.estimation.search import Fit
 
 SAMPLES = 3000  # largest number of samples of the sensor drawn
@@ -53,7 +53,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
     """
     run = plan.flown_run
     first = first_seconds(plan)
-    spans = [run.until, *[first] * (first < SHORT * run.until)]
+    spans = [run.until, first] if first < SHORT * run.until else [run.until]
     heights = [1.8, 1.8, *firings_height(run.flight)]
     figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
     shape: dict[str, Any] = {"height_ratios": heights, "width_ratios": [1.5, 1.0][: len(spans)]}
@@ -150,23 +150,21 @@ def budget_figure(budget: Budget) -> Figure:
     spacecraft, growth, until = budget.spacecraft, budget.spacecraft.growth, budget.until_largest
     # Cycles, or pulses of a loop that never pauses; with no nutation from the first that could grow
     # at once.
-    held = [
-        (
-            row.thresholds,
-            cycle,
-            1.0 / (cycle.cycles or cycle.pulses),
-            row.begins if math.isfinite(row.begins) else 0.0,
-        )
-        for row in budget.held
-        if (cycle := row.cycle) is not None
-    ]
+    held = []
+    for row in budget.held:
+        if row.cycle is not None:
+            period = 1.0 / (row.cycle.cycles or row.cycle.pulses)
+            begins = row.begins if math.isfinite(row.begins) else 0.0
+            held.append((row.thresholds, row.cycle, period, begins))
     size = max([PERIODS * period + begins for _, _, period, begins in held], default=0.0)
     if until is not None and math.isfinite(until):
         size = max(size, 1.2 * until)
     size = size or 3.0 / max(abs(growth), 1e-300)
-    unit, seconds = (
-        ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
-    )
+    unit, seconds = "s", 1.0
+    if size > 2.0 * DAY:
+        unit, seconds = "days", DAY
+    elif size > 7200.0:
+        unit, seconds = "hours", 3600.0
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
     times = np.linspace(0.0, size, ROWS)
@@ -215,12 +213,13 @@ FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 
 @style.styled()
-def fit_figure(fit: Fit) -> Figure:
+def fit_figure(fitted: Fitted) -> Figure:
     """Residuals of the signals below each other; beside them autocorrelations, and pulls of the
     parameters.
     """
     from nutdamp.estimation.results import estimates
 
+    fit = fitted.core
     signals = fit.model.signals
     figure = style.sheet(8.6, max(4.8, 1.2 + 1.15 * len(signals)))
     sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0])

@@ -147,7 +147,7 @@ def _draw_keep(
     """
     (place,), (height,) = looked.seen(direction)
     axes.plot(*place, "o", color=INK, markersize=6, markerfacecolor="none", zorder=4)
-    yield cone.name + " (behind)" * bool(height < 0.0), place
+    yield (f"{cone.name} (behind)" if height < 0.0 else cone.name), place
     square = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
     square /= np.linalg.norm(square)
     bounds = [("≥", cone.least, cone.least > 0.0), ("≤", cone.most, cone.most < math.pi)]

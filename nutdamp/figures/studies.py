@@ -16,8 +16,7 @@ from nutdamp.flight.propagation import model_name
 from nutdamp.montecarlo.statistics import VECTORS, Distribution
 from nutdamp.montecarlo.study import EARLY, Results
 from nutdamp.physics import attitude
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.tradeoff import Front, numbered
+from nutdamp.planning.tradeoff import Front, Trade, numbered
 from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -291,21 +290,15 @@ CHOSEN: dict[str, Any] = {
 
 
 @style.styled()
-def trade_figure(
-    spacecraft: Spacecraft,
-    fronts: Sequence[Front],
-    chosen: Plan | None = None,
-    *,
-    narrow: bool = False,
-) -> Figure:
+def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
     """End of the last firing against propellant (impulse where that is unknown), numbered as in the
-    table.
+    table, with the recommended plan among them.
 
-    ``chosen``: a plan to be marked among them. Fronts without points are named, with reasons.
-    ``narrow``: for phones.
+    Fronts without points are named, with reasons. ``narrow``: for phones.
     """
     from matplotlib.ticker import LogLocator, MaxNLocator
 
+    spacecraft, fronts, chosen = traded.spacecraft, traded.fronts, traded.recommended
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
     points = [point for _, _, point in numbered(fronts)]
@@ -336,7 +329,7 @@ def trade_figure(
         axes.axhline(least, **{**style.LIMIT, "label": name})
     if chosen is not None and len(chosen.pulses):
         place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
-        ideal = ", ideal impulses" * chosen.pulses.idealised
+        ideal = ", ideal impulses" if chosen.pulses.idealised else ""
         other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
         axes.plot(*place, "D", label=f"recommended: {chosen.scheme}{other}", **CHOSEN)
     axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)

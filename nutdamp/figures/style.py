@@ -270,7 +270,9 @@ def number(value: float) -> str:
 def angle(radians: float) -> str:
     """An angle given in rad, in degrees; below 1e-6° it is nothing to be seen."""
     shown = math.degrees(radians)
-    return f"{number(shown)}°" if abs(shown) >= 1e-6 else "< 1e-6°" if shown else "0°"
+    if abs(shown) >= 1e-6:
+        return f"{number(shown)}°"
+    return "< 1e-6°" if shown else "0°"
 
 
 def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:

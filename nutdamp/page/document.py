@@ -58,9 +58,10 @@ class Sheet(NamedTuple):
         for heading, texts in zip(self.columns, zip(*self.rows, strict=True), strict=False):
             dotted, barred = heading.name in self.dots, heading.name in self.bars
             sizes = [*map(number_in, texts)]
-            most = max((abs(size) for size in sizes if size is not None), default=0.0) or 1.0
+            largest = max((abs(size) for size in sizes if size is not None), default=0.0) or 1.0
             shown = [
-                None if size is None or not dotted else 100.0 * abs(size) / most for size in sizes
+                None if size is None or not dotted else 100.0 * abs(size) / largest
+                for size in sizes
             ]
             cells = zip(texts, shown, sizes, strict=True)
             columns.append(
@@ -275,16 +276,16 @@ class Control(NamedTuple):
         return " ".join(filter(None, (self.document, self.issue and f"iss {self.issue}")))
 
 
-def controlled(**given: str) -> Control:
+def controlled(**entries: str) -> Control:
     """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where
     that is set.
 
     Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
     """
-    unknown = sorted({*given} - {*Control._fields})
+    unknown = sorted({*entries} - {*Control._fields})
     if unknown:
         raise BadRequest(f"{unknown[0]}: expected one of {', '.join(Control._fields)}")
-    control = Control(**given)
+    control = Control(**entries)
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     if control.date or not epoch:
         return control

@@ -5,10 +5,11 @@ what to do on hold.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import accumulate
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -77,10 +78,8 @@ def manoeuvre_blocks(
     if flies and points is None:
         yield Prose("Tolerances not checked.")
     if flies:
-        yield FactList(
-            f"GO at t = 0 with{' (nominal)' * (points is None)}",
-            tuple(_conditions(spacecraft, points)),
-        )
+        title = "GO at t = 0 with (nominal)" if points is None else "GO at t = 0 with"
+        yield FactList(title, tuple(_conditions(spacecraft, points)))
     yield _fired(plan, judged, points, flies=flies)
     totals = [("totals", _totals(plan)), ("phase", _phase_note(spacecraft))]
     if not flies:
@@ -175,7 +174,7 @@ def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bo
     columns = zip(firsts, blocks, turned.tolist(), angles, holds, [*decide, MISSING], strict=True)
     rows = [SheetRow(index, *row) for index, row in enumerate(columns)]
     return sheet(
-        DataTable("Fire" if flies else "Pulses", [*_columns(plan, rows)], rows, flies),
+        DataTable("Fire" if flies else "Pulses", _columns(plan, rows), rows, flies),
         "sheet",
         folds=True,
     )
@@ -190,16 +189,12 @@ def _deadline(spacecraft: Spacecraft, end: float, start: float) -> str:
     return clock(spacecraft, start) or f"{math.floor(10.0 * start) / 10.0:.1f} s"
 
 
-def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
+def _columns(plan: Plan, rows: Sequence[SheetRow]) -> list[Column]:
     """Columns of pulses or of blocks; starts in UTC where there is an epoch, else from t = 0."""
     spacecraft = plan.spacecraft
     digits = _decimals(plan.spacecraft)
     blocks = plan.pulses.blocks
-
-    def column(
-        name: str, unit: str, value: Callable[[Any], Any], shown: Callable[[Any], str] = str
-    ) -> Column:
-        return Column("", name, unit, value, shown, "sheet")
+    limit, _ = limits(spacecraft)
 
     def seconds(time: float) -> str:
         return f"{time:.{digits}f}"
@@ -207,48 +202,50 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
     def start(row: SheetRow) -> str | None:
         return clock(spacecraft, row.pulse.loaded[0], min(digits, MILLISECONDS))
 
-    yield column("block" if blocks else "pulse", "", lambda row: row.at + 1)
     if all(map(start, rows)):
-        yield column(Shared.START, "UTC", start)._replace(kind=TEXT)
+        begin = Column("", Shared.START, "UTC", start, kind=TEXT)
     else:
-        yield column(Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
-    phase = "Sun phase" if sun_phased(spacecraft) else "spin phase"
-    yield column(
-        phase,
-        "deg",
-        lambda row: math.degrees(row.phase) % 360.0,
-        lambda angle: fixed(angle, 1, 360.0),
-    )
-    yield column(Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, spacecraft))._replace(
-        kind=TEXT
-    )
+        begin = Column("", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
     if blocks:
-        counts = " (counts)" * (spacecraft.commands is not None)
-        yield column(Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first)
-        yield column(
-            Shared.DELAY, f"s{counts}", lambda row: _counted(spacecraft, "delay", row.block.delay)
-        )
-        yield column(
-            Shared.ON_TIME, f"s{counts}", lambda row: _counted(spacecraft, "width", row.block.width)
-        )
-        yield column(Shared.PULSES, "", lambda row: row.block.count)
-        yield column(Shared.EVERY, "spin", lambda row: row.block.every)
+        unit = "s" if spacecraft.commands is None else "s (counts)"
+        delay = partial(_counted, spacecraft, "delay")
+        width = partial(_counted, spacecraft, "width")
+        fired = [
+            Column("", Shared.FIRST_SUN_PULSE, "", attrgetter("block.first")),
+            Column("", Shared.DELAY, unit, attrgetter("block.delay"), delay),
+            Column("", Shared.ON_TIME, unit, attrgetter("block.width"), width),
+            Column("", Shared.PULSES, "", attrgetter("block.count")),
+            Column("", Shared.EVERY, "spin", attrgetter("block.every")),
+        ]
     elif plan.pulses.idealised:
-        yield column(
-            Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: f"{size:.4g}"
-        )
+        size = attrgetter("pulse.magnitude")
+        fired = [Column("", Shared.IMPULSE, "N m s", size, "{:.4g}".format)]
     else:
-        yield column(Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], seconds)
-    least, _ = limits(spacecraft)
-    yield column(
-        Shared.NUTATION_AFTER,
-        "deg",
-        lambda row: row.nutation,
-        lambda angle: short_angle(angle, least),
-    )
-    for name, value in (("hold if outside", "hold"), ("decide before", "decide")):
-        yield column(name, "deg" * (value == "hold"), attrgetter(value))._replace(when=bool)
-    yield column("done", "", lambda _: "☐")._replace(kind=TEXT, when=bool)
+        fired = [Column("", Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], seconds)]
+    columns = [
+        Column("", "block" if blocks else "pulse", "", lambda row: row.at + 1),
+        begin,
+        Column(
+            "",
+            "Sun phase" if sun_phased(spacecraft) else "spin phase",
+            "deg",
+            lambda row: math.degrees(row.phase) % 360.0,
+            lambda angle: fixed(angle, 1, 360.0),
+        ),
+        Column("", Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, spacecraft), kind=TEXT),
+        *fired,
+        Column(
+            "",
+            Shared.NUTATION_AFTER,
+            "deg",
+            attrgetter("nutation"),
+            lambda angle: short_angle(angle, limit),
+        ),
+        Column("", "hold if outside", "deg", attrgetter("hold"), when=bool),
+        Column("", "decide before", "", attrgetter("decide"), when=bool),
+        Column("", "done", "", lambda _: "☐", kind=TEXT, when=bool),
+    ]
+    return [column._replace(where="sheet") for column in columns]
 
 
 def _counted(spacecraft: Spacecraft, which: str, value: float) -> str:
@@ -270,10 +267,9 @@ def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float
     limit = limits(points.study.model.spacecraft)[0]
     rows = [number - 1 for number in even(len(counts), CHECKED)]
     texts = [MISSING] * len(counts)
-    for row, (least, most) in zip(
-        rows, points.nutation_after([counts[row] for row in rows]), strict=True
-    ):
-        bounds = min(least, expected[row]), max(most, expected[row])
+    ranges = points.nutation_after([counts[row] for row in rows])
+    for row, (low, high) in zip(rows, ranges, strict=True):
+        bounds = min(low, expected[row]), max(high, expected[row])
         texts[row] = " to ".join(short_angle(bound, limit) for bound in bounds)
     return texts
 
@@ -297,7 +293,7 @@ def _phase_note(spacecraft: Spacecraft) -> str:
             "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, "
             "at the commanded start."
         )
-    falls = ", positive about +3, so that it falls with this spin" * (spacecraft.spin < 0.0)
+    falls = ", positive about +3, so that it falls with this spin" if spacecraft.spin < 0.0 else ""
     return (
         f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, "
         "at the commanded start."
@@ -321,7 +317,7 @@ def _decimals(spacecraft: Spacecraft) -> int:
     """Decimals of times in s: as many as the steps of commands need, else no finer than the
     tolerance of timing.
     """
-    tick, given = spacecraft.limits.tick, spacecraft.dispersions
+    tick, dispersions = spacecraft.limits.tick, spacecraft.dispersions
     if tick is not None:
         fine = (
             digits
@@ -329,14 +325,8 @@ def _decimals(spacecraft: Spacecraft) -> int:
             if math.isclose(tick, round(tick, digits), rel_tol=1e-9)
         )
         return next(fine, FINEST)
-    sizes = (
-        []
-        if given is None
-        else [each.size for each in (given.timing, given.timing_offset) if each is not None]
-    )
-    coarsest = max(map(abs, sizes), default=0.0)
-    return (
-        MILLISECONDS
-        if coarsest == 0.0
-        else min(max(math.ceil(-math.log10(coarsest) - 1e-9), 0), FINEST)
-    )
+    timings = () if dispersions is None else (dispersions.timing, dispersions.timing_offset)
+    coarsest = max((abs(entry.size) for entry in timings if entry is not None), default=0.0)
+    if coarsest == 0.0:
+        return MILLISECONDS
+    return min(max(math.ceil(-math.log10(coarsest) - 1e-9), 0), FINEST)

@@ -38,8 +38,8 @@ from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.parts import angle_names, angle_texts, channel_text
-from nutdamp.views.text import MISSING, most, quantity
+from nutdamp.views.parts import channel_text, direction_columns
+from nutdamp.views.text import MISSING, limit_text, quantity
 
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
 """Even rows in the quickest nutation turn; least and largest number of them altogether."""
@@ -69,16 +69,19 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
         circles = (
             []
             if shift is None
-            else [Circle(f"H at most {most(shift)} from target", shift, "target")]
+            else [Circle(f"H at most {limit_text(shift)} from target", shift, "target")]
         )
         directions.append(NamedDirection("target", spacecraft.goal.axis, "target", tuple(circles)))
     for keep in spacecraft.watched:
         if keep.direction is not None:
-            bounds = [("least", keep.least, "keep-out")] * (keep.least > 0.0)
-            bounds += [("most", keep.most, "keep-in")] * (keep.most < math.pi)
+            bounds = [
+                ("least", keep.least, "keep-out", keep.least > 0.0),
+                ("most", keep.most, "keep-in", keep.most < math.pi),
+            ]
             circles = [
-                Circle(f"axis at {word} {most(size)} from {keep.name}", size, kind)
-                for word, size, kind in bounds
+                Circle(f"axis at {word} {limit_text(size)} from {keep.name}", size, kind)
+                for word, size, kind, bounded in bounds
+                if bounded
             ]
             directions.append(
                 NamedDirection(keep.name, keep.direction, "watched", tuple(circles), watched=True)
@@ -119,12 +122,11 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
     )
     clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
     # The angles of the spin axis, as every table shows them, in units of their last decimal.
+    angles = direction_columns(spacecraft)
+    texts_of_angles = [[angle.shown(axis) for axis in track.axis] for angle in angles]
     pointing = [
-        [
-            NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS)
-            for text in column
-        ]
-        for column in zip(*(angle_texts(spacecraft, axis) for axis in track.axis), strict=True)
+        [NONE if text == MISSING else round(float(text) * 10**ANGLE_DIGITS) for text in column]
+        for column in texts_of_angles
     ]
     columns |= {
         "t": _whole(track.t, clock),
@@ -177,7 +179,7 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         panels,
         strip,
         *_speeds(until),
-        angle_names(spacecraft),
+        (angles[0].heading, angles[1].heading),
         named,
         utc is not None,
         "azimuths" if spacecraft.attitude is None else "right ascensions",
@@ -195,10 +197,12 @@ def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, .
     its pulses.
     """
     if plan.from_file:
-        pulses = [f"--{'blocks' if plan.pulses.blocks else 'schedule'} {shlex.quote(plan.scheme)}"]
+        option = "--blocks" if plan.pulses.blocks else "--schedule"
+        pulses = [f"{option} {shlex.quote(plan.scheme)}"]
     elif plan.scheme in SCHEMES and plan.spacecraft.goal.sun is None:
-        disturbed = ["--with-disturbances"] * plan.options.with_disturbances
-        pulses = [f"--scheme {plan.scheme}", *disturbed]
+        pulses = [f"--scheme {plan.scheme}"]
+        if plan.options.with_disturbances:
+            pulses.append("--with-disturbances")
     else:
         return ()
     rows = ("--flown", f"--until {until:.12g}", f"--samples {samples}", "--csv FILE")
@@ -255,9 +259,8 @@ def _whole(values: Vector, digits: int) -> list[int]:
 
 def _dates(spacecraft: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
     """UTC of each row: their common beginning, and the rest of each; None without an epoch."""
-    dates = [
-        date for time in track.t.tolist() if (date := spacecraft.utc(time, digits)) is not None
-    ]
+    every = (spacecraft.utc(time, digits) for time in track.t.tolist())
+    dates = [date for date in every if date is not None]
     if len(dates) < len(track.t):
         return None
     # Dates are in order, so that the common beginning of the first and the last is that of all.
@@ -394,7 +397,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         ),
         zero=rise(0.0),
         required=rise(level) if low < level < high else None,
-        outside="" if required is None or low < level < high else most(math.radians(level)),
+        outside="" if required is None or low < level < high else limit_text(math.radians(level)),
         channels=channels,
         bars=tuple(
             (channels.index(pulse.channel), *spread(*span))
@@ -428,12 +431,14 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
     """The workbench of a flight, which must have one by `absence`; ``craft`` as in `moving_of`."""
     spacecraft = flown.spacecraft
     limits = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
-    parts = [Part.NUTATION, Part.SHIFT, *[Part.DISTANCE] * (spacecraft.goal.axis is not None)]
+    parts = [Part.NUTATION, Part.SHIFT]
+    if spacecraft.goal.axis is not None:
+        parts.append(Part.DISTANCE)
     rows = [
         (
             part.value,
             part.label,
-            f"≤ {most(limits[part]).removesuffix(' deg')}°" if part in limits else "",
+            f"≤ {limit_text(limits[part]).removesuffix(' deg')}°" if part in limits else "",
         )
         for part in parts
     ]

@@ -15,7 +15,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -54,7 +54,7 @@ from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import NO_NUTATION, Plan
 from nutdamp.planning.simulation import unrounded
-from nutdamp.planning.tradeoff import Front
+from nutdamp.planning.tradeoff import Front, Trade
 from nutdamp.planning.verdict import Light, Line, Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import glance, guide
@@ -64,7 +64,6 @@ from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Topic
 from nutdamp.views.parts import NOTES, pulse_table
 from nutdamp.views.simulation import (
-    BUDGET,
     BUDGET_NOTE,
     budget_table,
     conservation,
@@ -233,7 +232,8 @@ class Repeat(NamedTuple):
         if not built_in and not Path(self.name).is_file():
             return "SPACECRAFT"
         keys = (f"--set={key}={value}" for key, value in self.settings)
-        return printable(shlex.join([*[self.name] * (not built_in), *keys, *self.goal]))
+        words = [*keys, *self.goal] if built_in else [self.name, *keys, *self.goal]
+        return printable(shlex.join(words))
 
     @property
     def digest(self) -> str:
@@ -269,25 +269,20 @@ def report_page(
     remarks = glance.notes(compared)
     notes = [text(note) for note in remarks if severity(note) != WARNING]
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
+    contenders = []
+    for plan in compared.plans:
+        word = verdicts.scheme_word(compared, plan)
+        texts = (verdicts.spent(plan.pulses), word) if plan.feasible else (word,)
+        contenders.append(document.Contender(plan.scheme, texts, plan is chosen))
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
             title=control.title or _title(spacecraft),
             control=control,
-            source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
+            source=f"input {repeat.digest[:8]}" if repeat.digest else "",
             state=judged.light.value,
             headline=(lead, about),
             notes=tuple(notes[:NOTES]),
-            contenders=tuple(
-                document.Contender(
-                    plan.scheme,
-                    (
-                        *[verdicts.spent(plan.pulses)] * plan.feasible,
-                        glance.scheme_verdict(compared, plan),
-                    ),
-                    plan is chosen,
-                )
-                for plan in compared.plans
-            ),
+            contenders=tuple(contenders),
             made_by=f"nutdamp {__version__}",
             verdict="" if chosen is None else verdicts.statement(judged),
             warnings=tuple(warnings),
@@ -324,14 +319,14 @@ def _bar(judged: Verdict, line: Line) -> document.Bar:
     alone = (
         ""
         if line.share is None or judged.cases is None
-        else verdicts.percent(line.share, judged.cases.probability)
+        else f"{verdicts.percent(line.share, judged.cases.probability)} keep it"
     )
     texts = (
         f"nominal {verdicts.value(bound, line.nominal)}",
         "" if dispersed is None else level + verdicts.value(bound, dispersed),
         f"limit {verdicts.limit(bound)}",
         f"margin {verdicts.margin(line)}",
-        f"{alone} keep it" * bool(alone),
+        alone,
         verdicts.line_word(line),
     )
     used = tuple(
@@ -359,8 +354,8 @@ def _sections(
     if chosen is not None:
         title = f"Manoeuvre sheet: {compared.spacecraft.name}, {chosen.scheme}"
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
-        known = [(name, text) for name, text in identity if text]
-        blocks = manoeuvre_blocks(chosen, judged, known, page.summary)
+        entries = [(name, text) for name, text in identity if text]
+        blocks = manoeuvre_blocks(chosen, judged, entries, page.summary)
         # Before the sheet, which is a page of its own in print: one line after it would be another.
         yield PageSection("verification", "Verification", tuple(_verification(chosen)))
         yield PageSection("manoeuvre", title, tuple(blocks))
@@ -381,14 +376,15 @@ def _cases_of(compared: Comparison) -> Dispersion | None:
 
 
 def _title(spacecraft: Spacecraft) -> str:
-    aims = [f"damp {math.degrees(spacecraft.tilt):.4g}° nutation"] * (spacecraft.tilt > NO_NUTATION)
-    aims += [f"turn by {math.degrees(spacecraft.to_turn):.4g}°"] * (
-        spacecraft.goal.axis is not None
-    )
-    aims += (
-        [] if spacecraft.goal.spin is None else [f"spin at {RPM * spacecraft.goal.spin:.4g} rpm"]
-    )
-    aims += ["built-in example"] * spacecraft.built_in
+    aims = []
+    if spacecraft.tilt > NO_NUTATION:
+        aims.append(f"damp {math.degrees(spacecraft.tilt):.4g}° nutation")
+    if spacecraft.goal.axis is not None:
+        aims.append(f"turn by {math.degrees(spacecraft.to_turn):.4g}°")
+    if spacecraft.goal.spin is not None:
+        aims.append(f"spin at {RPM * spacecraft.goal.spin:.4g} rpm")
+    if spacecraft.built_in:
+        aims.append("built-in example")
     return " · ".join([spacecraft.name, ", ".join(aims)]) if aims else spacecraft.name
 
 
@@ -401,7 +397,8 @@ def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     judged, results = dispersed.verdict, dispersed.core
     told = [line for line in verdict_lines(judged, results) if isinstance(line, Text)]
     lines = [Prose(document.plain(line)) for line in (*told, *cone_lines(results))]
-    lines += [Prose(f"Note: {note}.")] if (note := results.study.lightening_error) else []
+    note = results.study.lightening_error
+    lines += [Prose(f"Note: {note}.")] if note else []
     required = document.sheet(verdicts.bound_table(judged))
     yield from lines
     yield required
@@ -448,19 +445,17 @@ def _verification(chosen: Plan) -> Iterator[Block]:
         spacecraft, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
     )
     yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
-    missing = tuple(
+    blocks: list[Block] = [document.sheet(methods_table(verified), "screen")]
+    missing = [
         (method.name, f"not flown; {method.missing}")
         for method in verified.methods
         if method.missing
-    )
-    flights = document.sheet_of(
-        "Maximum differences from the flown motion", methods_table(verified)
-    )
-    budget = document.sheet_of(BUDGET, budget_table(spacecraft, verified)), Prose(BUDGET_NOTE)
-    yield Details(
-        "Independent flights and error budget",
-        (flights, *[Points(missing)] * bool(missing), *budget),
-    )
+    ]
+    if missing:
+        blocks.append(Points(tuple(missing)))
+    budget = budget_table(spacecraft, verified)
+    blocks += [document.sheet(budget, "screen"), Prose(BUDGET_NOTE)]
+    yield Details("Independent flights and error budget", tuple(blocks))
 
 
 def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterator[Block]:
@@ -562,8 +557,9 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     """Time against cost, with the recommended plan among the schedules of the fronts; raises
     MissingExtra.
     """
-    draw = partial(studies.trade_figure, compared.spacecraft, fronts, compared.recommended)
-    return _picture("trade", draw(), draw(narrow=True))
+    traded = Trade(compared.spacecraft, tuple(fronts), compared.recommended)
+    figures = (studies.trade_figure(traded, narrow=narrow) for narrow in (False, True))
+    return _picture("trade", *figures)
 
 
 def dispersion_pictures(dispersed: Dispersion) -> tuple[Picture, ...]:
@@ -590,10 +586,11 @@ EQUATIONS = (
 
 def _method(compared: Comparison) -> Iterator[Block]:
     """A paragraph on the method, the equations used with their symbols, the sources."""
-    unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (
-        not compared.spacecraft.inertia.symmetric
-    )
-    wheel = " With the wheel H3 = Cω3 + h stands for the Cω3 below, and ω3 - H3/A for aω3."
+    inertia = compared.spacecraft.inertia
+    moves = "; with I1 ≠ I2 the true tensor moves freely in between"
+    unequal = "" if inertia.symmetric else moves
+    holds = " With the wheel H3 = Cω3 + h stands for the Cω3 below, and ω3 - H3/A for aω3."
+    wheel = holds if inertia.wheel else ""
     yield Prose(
         "Schemes plan on the nominal values of the input file "
         f"({', '.join(plan.scheme for plan in compared.plans)}). "
@@ -603,12 +600,14 @@ def _method(compared: Comparison) -> Iterator[Block]:
         "Recommendation, requirement and "
         "verdict go by that flight. By M(17), the impulse sum, "
         "each pulse acts at its centre with its effective "
-        f"impulse{unequal}.{wheel * (compared.spacecraft.inertia.wheel != 0.0)}"
+        f"impulse{unequal}.{wheel}"
     )
     chosen = compared.recommended
-    topics = [guide.found(number) for number in EQUATIONS]
+    topics = [guide.topic_of(number) for number in EQUATIONS]
     scheme = (
-        guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
+        guide.topic_of(chosen.scheme)
+        if chosen is not None and chosen.scheme in guide.NAMES
+        else None
     )
     formulas = [(topic, -1) for topic in topics]  # of an equation the last one, which is in use
     formulas += [] if scheme is None else [(scheme, 0)]

@@ -36,7 +36,7 @@ VIEWS = {
     "Spacecraft.data": "views.decisions:spacecraft_json",
     **{
         f"{kind}.{what}": f"page.results:{what}"
-        for kind in ("Spacecraft", "Plan", "Comparison", "Flight")
+        for kind in ("Spacecraft", "Plan", "Comparison", "Flight", "Simulation")
         for what in ("line", "html")
     },
     **{
@@ -53,11 +53,11 @@ VIEWS = {
     "Comparison.reason": "page.results:comparison_reason",
     "RobustComparison.data": "page.results:robust_data",
     "Simulation.data": "views.simulation:simulation_json",
-    **{f"Simulation.{what}": f"page.results:{what} shown" for what in ("line", "html")},
-    "Trade.data": "views.trade:trade_json spacecraft fronts",
-    "Trade.csv": "views.trade:trade_csv fronts",
-    "Trade.figure": "figures.studies:trade_figure spacecraft fronts recommended",
-    "Trade.screen": "views.trade:trade_screen spacecraft fronts",
+    "Simulation.screen": "views.simulation:simulation_screen",
+    "Trade.data": "views.trade:trade_json",
+    "Trade.csv": "views.trade:trade_csv",
+    "Trade.figure": "figures.studies:trade_figure",
+    "Trade.screen": "views.trade:trade_screen",
     "Dispersion.data": "views.dispersion:dispersion_json",
     "Dispersion.figure": "figures.studies:dispersion_figure",
     "Dispersion.screen": "views.dispersion:dispersion_screen",
@@ -69,13 +69,13 @@ VIEWS = {
     "LoopPlan.screen": "views.loop:loop_screen",
     "LoopVerification.data": "views.loop:verified_json",
     "LoopVerification.screen": "views.loop:verification_screen",
-    "Fitted.data": "views.fit:fit_json core",
-    "Fitted.figure": "figures.signals:fit_figure core",
-    "Fitted.text": "files.carried:fitted_text core",
+    "Fitted.data": "views.fit:fit_json",
+    "Fitted.figure": "figures.signals:fit_figure",
+    "Fit.text": "files.carried:fitted_text",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
-    "Verified.data": "views.simulation:verification_json plan.flight plan.scheme core",
-    "Verified.screen": "views.simulation:verification_screen plan core",
+    "Verified.data": "views.simulation:verification_json",
+    "Verified.screen": "views.simulation:verification_screen",
     "Budget.data": "views.loop:budget_json",
     "Budget.csv": "views.loop:budget_csv",
     "Budget.figure": "figures.signals:budget_figure",
@@ -167,8 +167,10 @@ def write(_: object, path: str | PathLike[str], text: str) -> None:
     write_whole(units.path("path", path), text)
 
 
-def line(result: Spacecraft | Plan | Flight | Comparison) -> str:
+def line(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str:
     """Summary of a result in one line."""
+    if isinstance(result, Simulation):
+        return line(result.shown)
     if isinstance(result, Spacecraft):
         inertia = result.inertia
         shape = f"{inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(result.nutation)}"
@@ -180,10 +182,9 @@ def line(result: Spacecraft | Plan | Flight | Comparison) -> str:
         )
         return f"<Comparison of {', '.join(plan.scheme for plan in result)}: {verdict}>"
     if isinstance(result, Flight):
-        left = result.residual
-        ended = (
-            f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
-        )
+        residual = result.residual
+        shift = degrees(residual.momentum_shift)
+        ended = f"nutation left {degrees(residual.nutation)}, momentum shift {shift}"
         return f"<Flight of {_summary(result)}: {ended}>"
     if result.flown is None:
         return f"<Plan {result.scheme}: infeasible, {result.why}>"
@@ -194,10 +195,12 @@ def line(result: Spacecraft | Plan | Flight | Comparison) -> str:
     return f"<Plan {result.scheme}: {ended}>"
 
 
-def html(result: Spacecraft | Plan | Flight | Comparison) -> str | None:
+def html(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str | None:
     """HTML table of a result for notebooks, with the picture of its motion; None without the extra
     plot.
     """
+    if isinstance(result, Simulation):
+        return html(result.shown)
     from nutdamp.figures.image import svg
     from nutdamp.page.report import block_html
 

@@ -32,7 +32,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     file_columns,
     to_figures,
     values_of,
@@ -47,16 +46,12 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
     """
 
     def on_times(row: ChannelSteps) -> str:
-        most = row.channel.max_on_time
-        return (
-            f"{duration(row.channel.min_on_time)} to "
-            f"{'any' if math.isinf(most) else duration(most)}"
-        )
+        longest = row.channel.max_on_time
+        until = "any" if math.isinf(longest) else duration(longest)
+        return f"{duration(row.channel.min_on_time)} to {until}"
 
     columns = (
-        Column(
-            "name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT
-        ),
+        Column.named("name=channel.name", Shared.CHANNEL, "", where="screen json", kind=TEXT),
         Column(
             "torque#_Nm",
             "torque, file axes",
@@ -70,22 +65,14 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         *file_columns(
             "json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"
         ),
-        Column(
-            "smallest_step_deg",
+        Column.named(
+            "smallest_step_deg=smallest",
             "smallest step",
             "deg",
-            angle_of("smallest"),
             lambda step: small_angle(step) if step else "any",
             "screen json",
         ),
-        Column(
-            "largest_step_deg",
-            "largest step",
-            "deg",
-            angle_of("largest"),
-            small_angle,
-            "screen json",
-        ),
+        Column.named("largest_step_deg=largest", "largest step", "deg", small_angle, "screen json"),
         *file_columns("json", "damps=channel.damps"),
     )
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
@@ -147,35 +134,16 @@ def valve_table(spacecraft: Spacecraft) -> DataTable:
 
 
 TURNS = (
-    Column(
-        "name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT
+    Column.named("name=channel.name", "command blocks", "", where="screen json", kind=TEXT),
+    Column.named(
+        "smallest_turn_deg=smallest", "least turn of H", "deg", small_angle, "screen json"
     ),
-    Column(
-        "smallest_turn_deg",
-        "least turn of H",
-        "deg",
-        angle_of("smallest"),
-        small_angle,
-        "screen json",
+    Column.named(
+        "smallest_turn_width_s=smallest_width", "by a pulse of", "", duration, "screen json"
     ),
-    Column(
-        "smallest_turn_width_s",
-        "by a pulse of",
-        "",
-        lambda row: row.smallest_width,
-        duration,
-        "screen json",
-    ),
-    Column(
-        "largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"
-    ),
-    Column(
-        "largest_turn_width_s",
-        "by a pulse of",
-        "",
-        lambda row: row.largest_width,
-        duration,
-        "screen json",
+    Column.named("largest_turn_deg=largest", "largest turn", "deg", small_angle, "screen json"),
+    Column.named(
+        "largest_turn_width_s=largest_width", "by a pulse of", "", duration, "screen json"
     ),
 )
 
@@ -210,14 +178,14 @@ def disturbance_table(spacecraft: Spacecraft) -> DataTable:
 
     columns = (
         Column(
-            "",
+            "name",
             "disturbance",
             "",
-            lambda row: row.disturbance.name or f"number {numbers[id(row)]}",
-            where="screen",
+            lambda row: row.disturbance.name or None,
+            where="screen json",
             kind=TEXT,
+            words=lambda row: row.disturbance.name or f"number {numbers[id(row)]}",
         ),
-        Column("name", "", "", lambda row: row.disturbance.name or None, where="json", kind=TEXT),
         Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
         *file_columns(
             "json",
@@ -269,9 +237,9 @@ def tolerance_table(spacecraft: Spacecraft) -> DataTable:
     alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
         thrusters = alike.setdefault((entry.tolerance, entry.kind, size_text(entry)), [])
-        given = getattr(spacecraft.dispersions, entry.tolerance)
+        tolerance = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
-        names = given if isinstance(given, Mapping) else ()
+        names = tolerance if isinstance(tolerance, Mapping) else ()
         thrusters += [name for name in names if name in (rest, rest[:-2]) and name not in thrusters]
     return DataTable("Dispersions", TOLERANCES, list(alike.items()))
 
@@ -282,7 +250,7 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     tolerances = tolerance_table(spacecraft)
     counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
     head = [named(spacecraft, "   ", ("VALID", "bold green"), counted)]
-    known = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
+    more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
     tables = [
         turn_table(spacecraft),
         valve_table(spacecraft),
@@ -290,7 +258,7 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     ]
     tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]
     return summary(
-        [*head, derived_table(spacecraft, known)],
+        [*head, derived_table(spacecraft, more)],
         partial(table.screen, "screen") if table.rows else None,
         (*warnings(spacecraft), *_notes(spacecraft, verbose)),
         "nutdamp plan · nutdamp report",

@@ -5,7 +5,6 @@ Vectors are in the axes of the file, angles in degrees.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from nutdamp.planning.notes import (
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.views.parts import commanded
+from nutdamp.views.parts import commanded, direction_columns
 from nutdamp.views.tables import values_of
 from nutdamp.views.text import joined, note_json, ordered
 from nutdamp.views.verdict import cases_json, line_json, verdict_json
@@ -161,15 +160,7 @@ def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
 
 def direction_json(spacecraft: Spacecraft, direction: Vector) -> dict[str, float | None]:
     """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
-    around, other = (
-        None if angle is None else math.degrees(angle) for angle in spacecraft.angles_of(direction)
-    )
-    named = {"tilt_deg": other, "azimuth_deg": around}
-    return (
-        named
-        if spacecraft.attitude is None
-        else {"right_ascension_deg": around, "declination_deg": other}
-    )
+    return {column.key: column.value(direction) for column in direction_columns(spacecraft)}
 
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:

@@ -100,38 +100,43 @@ EMPTY = (
 """Note on a case whose tank runs empty."""
 
 
-def dispersion_brief(flown: Dispersion) -> RenderableType:
-    """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst
-    case.
-    """
-    results, judged = flown.core, flown.verdict
-    head = [_title(results, flown.plan.scheme), *verdict_lines(judged, results), *_emptied(results)]
-    notes = [*main_causes(judged)]
-    case = f" · {again(results)} (worst)" * _varies(results)
-    notes += tolerances.unused_notes(results.study.model.inputs.unused)
-    return summary(
-        head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}"
-    )
-
-
-def dispersion_screen(flown: Dispersion, *, worst: int) -> Group:
-    """All tables of ``disperse``."""
-    results, study, spacecraft = flown.core, flown.core.study, flown.plan.spacecraft
-    head = [_title(results, flown.plan.scheme), *verdict_lines(flown.verdict, results)]
-    parts: list[RenderableType] = [*head, Text(), _percentiles(results).screen("full")]
-    parts.append(angles_note(spacecraft))
-    if not results.exact:
-        parts.append(
-            Text(
-                "Percentiles are right to 0.006 % of their value; nominal and max are exact.",
-                style="dim",
-            )
+def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) -> RenderableType:
+    """The screen of ``disperse``: verdict, percentiles, what counts most, and worst cases."""
+    results, judged, spacecraft = flown.core, flown.verdict, flown.plan.spacecraft
+    study = results.study
+    ideal = model_name([study.model.schedule]) == IDEAL_IMPULSES
+    how = "ideal impulses" if ideal else "full simulation"
+    drawn = f"cases: {results.done:,}, seed {study.seed}"
+    if results.redrawn:
+        drawn += f", unphysical and drawn again: {results.redrawn:,}"
+    title = named(study.model.spacecraft, f": {flown.plan.scheme}, {how}; {drawn}")
+    head = [title, *verdict_lines(judged, results)]
+    emptied = []
+    if results.emptied:
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        words = (f"empty too soon in {share} of cases", "red")
+        emptied.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
+    percentiles = percentile_table(results, FLOWN_OUTPUTS, study.outputs_of({}), alone=True)
+    varies = any(entry.sigma for entry in study.model.inputs.drawn)
+    if not verbose:
+        case = f" · {again(results)} (worst)" if varies else ""
+        return summary(
+            [*head, *emptied],
+            lambda **_: percentiles.screen("screen"),
+            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused)],
+            f"--plot cases.png{case}",
         )
+    parts = [*head, Text(), percentiles.screen("full"), angles_note(spacecraft)]
+    if not results.exact:
+        right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
+        parts.append(Text(right, style="dim"))
     ends = facts(end_rows(flown.plan.flight, flown.plan.aspects))
     parts += [Text(), Text("Nominal case", style="bold"), ends]
-    events = [*cone_lines(results), *_emptied(results)]
-    parts += [*[Text()] * bool(events), *events, Text(), *tolerances.tolerance_budget(results)]
-    if worst and _varies(results):
+    events = [*cone_lines(results), *emptied]
+    if events:
+        parts += [Text(), *events]
+    parts += [Text(), *tolerances.tolerance_budget(results)]
+    if worst and varies:
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
         parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim"))
@@ -163,7 +168,7 @@ def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
         **tolerances.correlation_json(spacecraft),
         "unused": [entry.name for entry in study.model.inputs.unused],
         "unused_because": dict(study.model.inputs.unused),
-        "worst": [row_json(study, FLOWN_OUTPUTS, row) for row in _worst(results, worst)],
+        "worst": [row.data for row in _worst(results, worst)],
     }
 
 
@@ -181,26 +186,9 @@ def _worst(results: Results, count: int) -> list[CaseRow]:
     return [_flown(study, case, study.draws_of(case)) for case in cases]
 
 
-def _title(results: Results, scheme: str) -> Text:
-    study = results.study
-    how = (
-        "ideal impulses"
-        if model_name([study.model.schedule]) == IDEAL_IMPULSES
-        else "full simulation"
-    )
-    drawn = f"cases: {results.done:,}, seed {study.seed}"
-    if results.redrawn:
-        drawn += f", unphysical and drawn again: {results.redrawn:,}"
-    return named(study.model.spacecraft, f": {scheme}, {how}; {drawn}")
-
-
 def again(results: Results | LoopResults) -> str:
     """Options that show the worst case alone."""
     return f"--seed {results.study.seed} --case {results.worst.cases[0] + 1}"
-
-
-def _varies(results: Results) -> bool:
-    return any(entry.sigma for entry in results.study.model.inputs.drawn)
 
 
 # --- percentiles
@@ -210,13 +198,14 @@ def percentiles_json(
     column: str, nominal: float | None, distribution: Distribution | None
 ) -> dict[str, float | None]:
     """The ``nominal`` value and the distribution in the unit of a ``column``."""
-    spread: list[float | None] = [None] * (len(PERCENTS) + 2)
+    values: dict[str, float | None] = dict.fromkeys(("nominal", "min", *LEVELS, "max"))
+    values["nominal"] = nominal
     if distribution is not None:
-        shares = np.array(PERCENTS) / 100.0
-        levels = distribution.quantiles(shares).tolist()
-        spread = [distribution.minimum, *levels, distribution.maximum]
-    values = zip(("nominal", "min", *LEVELS, "max"), (nominal, *spread), strict=True)
-    return {name: None if value is None else shown(column, value) for name, value in values}
+        levels = distribution.quantiles(np.array(PERCENTS) / 100.0).tolist()
+        values |= zip(LEVELS, levels, strict=True)
+        values["min"] = distribution.minimum
+        values["max"] = distribution.maximum
+    return {name: None if value is None else shown(column, value) for name, value in values.items()}
 
 
 def percentiles_of(
@@ -229,41 +218,40 @@ def percentiles_of(
     }
 
 
-def _percentiles(results: Results) -> DataTable:
-    """One row an output: values by shares of the cases."""
+def percentile_table(
+    results: Results | LoopResults,
+    outputs: Sequence[StudyOutput],
+    nominal: Array,
+    *,
+    alone: bool = False,
+) -> DataTable:
+    """One row an output: values by shares of the cases, or their sizes, to the digits of the
+    largest; ``alone``: nominal ones with digits of their own, as other places show them.
+    """
     rows = []
-    nominal = results.study.outputs_of({}).tolist()
-    for output, plan in zip(FLOWN_OUTPUTS, nominal, strict=True):
+    for output, value in zip(outputs, nominal.tolist(), strict=True):
         distribution = results.distribution(output.name)
-        row = percentile_row(output, plan, distribution)
-        if distribution is not None:  # with digits of its own: other places show it alone
-            plain = abs(output.shown_unit[1] * shown(output.key, plan))
-            row["nominal"] = "0" if plain < NOTHING else digits(plain, 4)
+        if distribution is None:
+            value = None
+        elif output.signed:
+            value = abs(value)
+            distribution = distribution.sizes()
+        scale = output.shown_unit[1]
+        values = percentiles_json(output.key, value, distribution)
+        largest = abs(scale * (values["max"] or 0.0))
+        row = dict[str, str | None]()
+        row[""] = output.label
+        for key, size in values.items():
+            if size is None or math.isnan(size):
+                row[key] = None
+            else:
+                row[key] = beside(scale * size, largest) if output.unit else f"{size:.0f}"
+        plain = values["nominal"]
+        if alone and plain is not None:
+            size = abs(scale * plain)
+            row["nominal"] = "0" if size < NOTHING else digits(size, 4)
         rows.append(row)
     return DataTable("Percentiles", PERCENTILES, rows)
-
-
-def percentile_row(
-    output: StudyOutput, nominal: float | None, distribution: Distribution | None
-) -> dict[str, str | None]:
-    """A row of `PERCENTILES`: values, or their sizes, to the digits of the largest."""
-    if output.signed and nominal is not None and distribution is not None:
-        nominal = abs(nominal)
-        distribution = distribution.sizes()
-    scale = output.shown_unit[1]
-    values = {
-        key: math.nan if value is None else scale * value
-        for key, value in percentiles_json(output.key, nominal, distribution).items()
-    }
-
-    def text(value: float) -> str | None:
-        if math.isnan(value):
-            return None
-        return beside(value, abs(values["max"])) if output.unit else f"{value:.0f}"
-
-    row = {key: text(value) for key, value in values.items()}
-    row[""] = output.label
-    return row
 
 
 # columns of rows of texts: the name without a key, the values by the names of `percentiles_json`
@@ -323,8 +311,8 @@ def requirement_of(judged: Verdict) -> dict[str, Any] | None:
     entry = verdicts.cases_json(judged.cases)
     if entry is None:
         return None
-    kept = {name: entry[name] for name in ("met_fraction", "low", "high", "probability")}
-    return {**kept, "confidence": 0.95, "met": judged.met}
+    shares = {name: entry[name] for name in ("met_fraction", "low", "high", "probability")}
+    return {**shares, "confidence": 0.95, "met": judged.met}
 
 
 def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
@@ -334,11 +322,11 @@ def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
     for keep, entry in _cones(results):
         share = verdicts.percent(entry["broken_fraction"], 1.0 - results.probability)
         bounds = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
-        least, most, *alone = (degrees(math.radians(entry[key])) for key in bounds)
+        near, far, *alone = (degrees(math.radians(entry[key])) for key in bounds)
         yield Text.assemble(
             (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),
             (f"broken in {share} of cases", "red" if entry["broken_fraction"] else "green"),
-            f"; {least} to {most} in all cases, {alone[0]} to {alone[1]} in the nominal one.",
+            f"; {near} to {far} in all cases, {alone[0]} to {alone[1]} in the nominal one.",
         )
 
 
@@ -358,76 +346,66 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
         if results.done and spacecraft.keep
         else ()
     )
-    for index, (keep, (least, largest)) in enumerate(zip(spacecraft.keep, nominal, strict=False)):
-        least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
+    for index, (keep, (near, far)) in enumerate(zip(spacecraft.keep, nominal, strict=False)):
+        nearest, farthest = np.degrees(results.aspects[index]).tolist()
         entry = values_of(keep, "name", "min_deg=least", "max_deg=most")
         entry |= {"broken_fraction": float(results.broken[index] / results.done)}
-        entry |= {"least_deg": least_of_all, "largest_deg": largest_of_all}
-        yield keep, entry | {"nominal_least_deg": least, "nominal_largest_deg": largest}
-
-
-def _emptied(results: Results) -> Iterator[Text]:
-    if results.emptied:
-        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
-        yield Text.assemble(
-            ("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}."
-        )
+        entry |= {"least_deg": nearest, "largest_deg": farthest}
+        yield keep, entry | {"nominal_least_deg": near, "nominal_largest_deg": far}
 
 
 # --- cases
 
 
 class CaseRow(NamedTuple):
-    """A case, from 0, or `ESTIMATE`: deviations of inputs, outputs, angles (m, 2) rad to cones,
-    ending of a loop.
-    """
+    """A case: its object in JSON files, deviations of its inputs, ending of a loop."""
 
-    case: int
+    data: dict[str, Any]
     draws: Mapping[str, float]
-    values: Sequence[float]
-    angles: Array | None
     stop: Ending | None = None
 
 
 ESTIMATE = -1  # number of the nominal case
 
 
+def case_row(
+    study: Study | LoopStudy,
+    outputs: Sequence[StudyOutput],
+    case: int,
+    draws: Mapping[str, float],
+    values: Sequence[float],
+    angles: Array | None,
+    stop: Ending | None = None,
+) -> CaseRow:
+    """Row of a case, from 0, or `ESTIMATE`: deviations of inputs, outputs, angles (m, 2) rad to
+    cones.
+    """
+    inputs = {
+        entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn
+    }
+    data: dict[str, Any] = {"case": case + 1, "inputs": inputs}
+    for output, value in zip(outputs, values, strict=True):
+        data[output.key] = None
+        if not math.isnan(value):
+            data[output.key] = shown(output.key, value) if output.unit else int(value)
+    if angles is not None and study.model.spacecraft.keep:
+        pairs = zip(study.model.spacecraft.keep, np.degrees(angles).tolist(), strict=True)
+        data["aspects"] = [
+            {"name": keep.name, "least_deg": near, "largest_deg": far}
+            for keep, (near, far) in pairs
+        ]
+    return CaseRow(data, draws, stop)
+
+
 def _flown(study: Study, case: int, draws: Mapping[str, float]) -> CaseRow:
     aspects = study.ends_of(draws).aspects
-    return CaseRow(
-        case, draws, study.outputs_of(draws).tolist(), None if aspects is None else aspects[:, :, 0]
-    )
+    angles = None if aspects is None else aspects[:, :, 0]
+    return case_row(study, FLOWN_OUTPUTS, case, draws, study.outputs_of(draws).tolist(), angles)
 
 
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
     """One case (from 0): the true value of each input, in SI, and the outputs."""
-    return row_json(study, FLOWN_OUTPUTS, _flown(study, case, draws))
-
-
-def row_json(
-    study: Study | LoopStudy, outputs: Sequence[StudyOutput], row: CaseRow
-) -> dict[str, Any]:
-    """A case as `case_json` has it; unknown outputs are None."""
-    inputs = {
-        entry.name: entry.nominal + row.draws.get(entry.name, 0.0)
-        for entry in study.model.inputs.drawn
-    }
-    data = {"case": row.case + 1, "inputs": inputs}
-    data |= {output.key: _output(at, output, row) for at, output in enumerate(outputs)}
-    if row.angles is not None and study.model.spacecraft.keep:
-        named = zip(study.model.spacecraft.keep, np.degrees(row.angles).tolist(), strict=True)
-        data["aspects"] = [
-            {"name": keep.name, "least_deg": near, "largest_deg": far}
-            for keep, (near, far) in named
-        ]
-    return data
-
-
-def _output(at: int, output: StudyOutput, row: CaseRow) -> float | int | None:
-    value = row.values[at]
-    if math.isnan(value):
-        return None
-    return shown(output.key, value) if output.unit else int(value)
+    return _flown(study, case, draws).data
 
 
 def case_table(
@@ -439,51 +417,65 @@ def case_table(
     """Cases, one row each; ``effects`` of the drawn inputs by which
     their contributors are ranked.
     """
-    return DataTable("Worst cases", tuple(_case_columns(study, outputs, rows, effects)), rows)
+    spacecraft, inputs = study.model.spacecraft, study.model.inputs.drawn
 
+    def value_of(*keys: str | int) -> Callable[[CaseRow], Any]:
+        def value(row: CaseRow) -> Any:
+            entry: Any = row.data
+            for key in keys:
+                entry = entry[key]
+            return entry
 
-def _case_columns(
-    study: Study | LoopStudy,
-    outputs: Sequence[StudyOutput],
-    rows: Sequence[CaseRow],
-    effects: Array | None,
-) -> Iterator[Column]:
-    cones, inputs = study.model.spacecraft.keep, study.model.inputs.drawn
-    yield Column("case", "case", "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
-    named = (Shared.THIS_CASE, Shared.NOMINAL)
-    yield Column("", "", "", lambda row: named[row.case == ESTIMATE], where="case", kind=TEXT)
+        return value
+
+    def degrees_of(name: str) -> Callable[[CaseRow], float]:
+        return lambda row: math.degrees(row.data["inputs"][name])
+
+    columns = [
+        Column("case", "case", "", value_of("case"), where="screen csv", kind=WHOLE),
+        Column(
+            "",
+            "",
+            "",
+            lambda row: Shared.THIS_CASE if row.data["case"] else Shared.NOMINAL,
+            where="case",
+            kind=TEXT,
+        ),
+    ]
     for entry in inputs:
-        yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
-    for at, output in enumerate(outputs):
-        value = partial(_output, at, output)
-        where = "csv" + " screen" * output.ranks
-        yield Column(
-            output.key, output.heading, output.unit, value, to_figures(4, output.scale), where
-        )
+        value = degrees_of(entry.name) if entry.unit == "rad" else value_of("inputs", entry.name)
+        columns.append(Column(column(entry), "", "", value, where="csv"))
+    for output in outputs:
+        value = value_of(output.key)
+        where = "csv screen" if output.ranks else "csv"
+        text = to_figures(4, output.scale)
+        columns.append(Column(output.key, output.heading, output.unit, value, text, where))
         text = _text_beside(output, map(value, rows))
-        yield Column("", output.heading, output.shown_unit[0], value, text, "case")
-    yield Column(
-        "stopped",
-        "",
-        "",
-        lambda row: row.stop.name.lower() if row.stop else None,
-        where="csv",
-        kind=TEXT,
+        columns.append(Column("", output.heading, output.shown_unit[0], value, text, "case"))
+    columns.append(
+        Column(
+            "stopped",
+            "",
+            "",
+            lambda row: row.stop.name.lower() if row.stop else None,
+            where="csv",
+            kind=TEXT,
+        )
     )
-    angles = [(which, cone) for cone in cones for which in ("least", "largest")]
-    for at, (key, (which, cone)) in enumerate(
-        zip(cone_columns(study.model.spacecraft), angles, strict=True)
-    ):
-        where = "csv case" + " screen" * (which in bounded(cone))
-        name = f"{which} from {cone.name}"
-        yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
-    heading = f"largest {'inputs' if effects is None else 'contributors'}, in sigmas"
-    yield Column("", heading, "", partial(_largest, inputs, effects), where="screen", kind=TEXT)
-
-
-def _true_value(entry: DispersedInput, row: CaseRow) -> float:
-    value = entry.nominal + row.draws[entry.name]
-    return math.degrees(value) if entry.unit == "rad" else value
+    keys = iter(cone_columns(spacecraft))
+    for at, keep in enumerate(spacecraft.keep):
+        angles = (("least", keep.least > 0.0), ("largest", keep.most < math.pi))
+        for which, bounded in angles:
+            value = value_of("aspects", at, f"{which}_deg")
+            where = "csv case screen" if bounded else "csv case"
+            heading = f"{which} from {keep.name}"
+            columns.append(Column(next(keys), heading, "deg", value, to_figures(4), where))
+    ranked = "inputs" if effects is None else "contributors"
+    largest = partial(_largest, inputs, effects)
+    columns.append(
+        Column("", f"largest {ranked}, in sigmas", "", largest, where="screen", kind=TEXT)
+    )
+    return DataTable("Worst cases", columns, rows)
 
 
 def _text_beside(output: StudyOutput, values: Iterable[float | None]) -> Callable[[float], str]:
@@ -495,10 +487,6 @@ def _text_beside(output: StudyOutput, values: Iterable[float | None]) -> Callabl
     factor = output.shown_unit[1]
     largest = max((abs(factor * value) for value in values if value is not None), default=0.0)
     return lambda value: beside(factor * value, largest)
-
-
-def _angle(at: int, row: CaseRow) -> float:
-    return math.nan if row.angles is None else math.degrees(row.angles.flat[at])
 
 
 def _largest(inputs: Sequence[DispersedInput], effects: Array | None, row: CaseRow) -> str:
@@ -521,17 +509,12 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
     """One case (from 0): every input, and the ends of it and of the nominal case."""
     rows = [_flown(study, ESTIMATE, {}), _flown(study, case, draws)]
     outcome = case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
-    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(
-        study.ends_of(draws).drained > 1.0
-    )
     title = named(study.model.spacecraft, f": {scheme}, seed {study.seed}, case {case + 1}")
     inputs = tolerances.inputs_table(study.model.inputs.drawn, draws)
-    return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
-
-
-def bounded(keep: Keep) -> list[str]:
-    """Bounded ones of the angles to the direction of a cone: the least, the largest."""
-    return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
+    parts: list[RenderableType] = [title, Text(), inputs, Text(), outcome.transposed("case")]
+    if study.ends_of(draws).drained > 1.0:
+        parts.append(Text(f"Tank empty too soon: {EMPTY}.", "red"))
+    return Group(*parts)
 
 
 def _shares(results: Results) -> Iterator[dict[str, Any]]:

@@ -136,7 +136,8 @@ def export_notes(plan: Plan, form: str) -> list[Note]:
     from nutdamp.common.results import note
     from nutdamp.files.ccsds.write import spinning
 
-    return [note("spin-alone")] * (FORMATS[form].nutates and not spinning(plan.spacecraft.inertia))
+    alone = FORMATS[form].nutates and not spinning(plan.spacecraft.inertia)
+    return [note("spin-alone")] if alone else []
 
 
 def lacking(plan: Plan, form: str) -> str | None:

@@ -63,7 +63,7 @@ def explained(requested: str) -> Topic:
         if wanted in (_folded(path.rpartition(".")[2]), _folded(path))
     ]
     try:
-        topic = guide.found(requested)
+        topic = guide.topic_of(requested)
     except BadRequest:
         if not texts and not keys:
             if section := next(_sections(wanted), None):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 from rich.console import RenderableType
@@ -16,6 +18,7 @@ from nutdamp.estimation.results import (
     UNTOLD,
     Carried,
     Estimate,
+    Fitted,
     carried,
     correlated,
     doubts,
@@ -26,7 +29,7 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import heading
 from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, values_of
 from nutdamp.views.text import note_json
 
 NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
@@ -61,18 +64,20 @@ def _value(row: Estimate) -> str:
     return f"{shown * _unit(row)[1]:.{_digits(row)}g}"
 
 
+def _sigma(row: Estimate) -> str | None:
+    sigma = _scaled("sigma", row)
+    return None if sigma is None else f"{sigma:.2g}"
+
+
 def _file(row: Estimate) -> str | None:
-    return None if row.file is None else f"{row.file * _unit(row)[1]:.{max(_digits(row) - 2, 4)}g}"
+    digits = max(_digits(row) - 2, 4)
+    return None if row.file is None else f"{row.file * _unit(row)[1]:.{digits}g}"
 
 
 def _changed(change: float) -> str:
-    return (
-        "0"
-        if abs(change) <= NOTHING
-        else f"{change:+.2g}"
-        if abs(change) < 99.5
-        else f"{change:+.0f}"
-    )
+    if abs(change) <= NOTHING:
+        return "0"
+    return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
 
 
 def _digits(estimate: Estimate) -> int:
@@ -83,18 +88,30 @@ def _digits(estimate: Estimate) -> int:
 
 
 ESTIMATES = (
-    Column("quantity", "", "", lambda row: row.key, where="json", kind=TEXT),
-    Column("", "quantity", "", lambda row: row.label, where="screen", kind=TEXT),
-    Column("value", "", "", lambda row: row.value * row.factor, where="json"),
-    Column("", "value", "", _value, where="screen"),
-    Column("", "sigma", "", lambda row: _scaled("sigma", row), to_figures(2), "screen"),
-    Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
+    Column.named(
+        "quantity=key", "quantity", "", where="screen json", kind=TEXT, words=attrgetter("label")
+    ),
+    Column(
+        "value",
+        "value",
+        "",
+        lambda row: row.value * row.factor,
+        where="screen json",
+        words=_value,
+    ),
+    Column(
+        "sigma",
+        "sigma",
+        "",
+        lambda row: row.sigma * row.factor,
+        where="screen json",
+        words=_sigma,
+    ),
     Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
-    Column("file", "", "", lambda row: _scaled("file", row), where="json"),
-    Column("", "file", "", _file, where="screen"),
+    Column("file", "file", "", partial(_scaled, "file"), where="screen json", words=_file),
     Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),
-    Column("change_sigmas", "change", "sigmas", lambda row: row.change, _changed, "screen json"),
-    Column("from", "from", "", lambda row: row.source, where="screen json", kind=TEXT),
+    Column.named("change_sigmas=change", "change", "sigmas", _changed, "screen json"),
+    Column.named("from=source", "from", "", where="screen json", kind=TEXT),
 )
 
 
@@ -127,20 +144,18 @@ def signal_table(fit: Fit) -> DataTable:
             where="screen json",
             kind=WHOLE,
         ),
-        Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
         Column(
-            "",
+            "noise_SI",
             "noise",
             "",
-            lambda at: fit.noise[at] * in_shown(fit.model.signals[at])[1],
-            to_figures(3),
-            "screen",
+            lambda at: float(fit.noise[at]),
+            where="screen json",
+            words=lambda at: f"{fit.noise[at] * in_shown(fit.model.signals[at])[1]:.3g}",
         ),
         Column(
             "", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT
         ),
-        Column("white", "", "", fit.white, where="json"),
-        Column("", "residuals", "", verdict, where="screen", kind=TEXT),
+        Column("white", "residuals", "", fit.white, where="screen json", kind=TEXT, words=verdict),
     )
     return DataTable("Signals", columns, range(len(of_signal)))
 
@@ -155,7 +170,8 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
         if colored
         else "residuals: noise"
     )
-    if outliers := int((~fit.used).sum()):
+    outliers = int((~fit.used).sum())
+    if outliers:
         test += f"; outliers left out: {outliers}"
     record, values, spacecraft = fit.model.record, fit.named, fit.model.spacecraft
     wheel = values.get("wheel", spacecraft.inertia.wheel) / in_moments(spacecraft, values)[0]
@@ -181,9 +197,9 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
     """Parameters that the data do not determine, or only together, and unexpected estimates."""
     yield from doubts(fit)
     yield from untold(fit.model.record)
-    kept = [estimate.label for estimate in rows if estimate.source == UNTOLD]
-    if kept:
-        yield note("fit-kept", estimates=", ".join(kept))
+    of_file = [estimate.label for estimate in rows if estimate.source == UNTOLD]
+    if of_file:
+        yield note("fit-kept", estimates=", ".join(of_file))
     both = float(carried(fit, fit.model.start).correlation[0, 1])
     tied = [f"A and C {both:+.4f}"] if abs(both) > CORRELATED else []
     tied += [
@@ -196,12 +212,12 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
         yield note("fit-one-moment")
 
 
-def fit_json(fit: Fit, at_time: Carried, warnings: Sequence[str] = ()) -> dict[str, Any]:
+def fit_json(fitted: Fitted, at_time: Carried) -> dict[str, Any]:
     """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions.
 
-    ``warnings`` of reading the record go into the notes, before the doubts about the estimates.
+    Warnings of reading the record stand in the notes, before the doubts about the estimates.
     """
-    model = fit.model
+    fit, model = fitted.core, fitted.core.model
     return {
         **heading(model.spacecraft),
         "record": {
@@ -221,7 +237,7 @@ def fit_json(fit: Fit, at_time: Carried, warnings: Sequence[str] = ()) -> dict[s
         "notes": [
             note_json(entry)
             for entry in (
-                *(note("record-read", warning=warning) for warning in warnings),
+                *(note("record-read", warning=warning) for warning in fitted.warnings),
                 *(*doubts(fit), *untold(model.record), *notes(fit, at_time)),
             )
         ],

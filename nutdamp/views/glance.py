@@ -25,11 +25,9 @@ from nutdamp.planning.notes import (
     verdict_notes,
 )
 from nutdamp.planning.plan import Plan
-from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views import parts
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.tables import (
@@ -60,7 +58,8 @@ if TYPE_CHECKING:
     from nutdamp.flight.cones import Aspect
 
 NOT = "✗"  # sign before a value above the requirement
-SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
+# names of angles of directions where there is little room
+SHORT_NAMES = {"right ascension": "RA", "declination": "dec"}
 
 
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
@@ -77,9 +76,9 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
 
 def limits(spacecraft: Spacecraft) -> tuple[float, float]:
     """Limits, rad, of the nutation and of the end of H, infinite where there are none."""
-    most = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
-    ends = [most[part] for part in (Part.SHIFT, Part.DISTANCE) if part in most]
-    return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
+    largest = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
+    ends = [largest[part] for part in (Part.SHIFT, Part.DISTANCE) if part in largest]
+    return largest.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
 def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
@@ -88,32 +87,18 @@ def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
     return lambda plan: value(plan) if plan.feasible else None
 
 
-def scheme_verdict(compared: Comparison, plan: Plan) -> str:
-    """Verdict on a plan, or why it is not recommended, or why there is none."""
-    return verdicts.scheme_word(compared, plan) if plan.feasible else no_plan(plan)
-
-
-def no_plan(plan: Plan) -> str:
-    """Text in the column of a scheme that has no plan."""
-    if plan.failure is None:
-        without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
-        word = "not found" if plan.found_none else "infeasible"
-        return "no thrusters" if without else word
-    return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
-
-
-def cost(schedule: Schedule) -> Iterator[tuple[str, str]]:
-    """Cost and end of a schedule: names and values."""
-    yield (
-        "impulse" if schedule.propellant is None else "propellant",
-        f"{verdicts.spent(schedule)}, pulses: {len(schedule)}",
-    )
-    yield "last pulse ends", moment(schedule.end) if len(schedule) else "no pulse is needed"
-
-
 def end_facts(plan: Plan) -> Table:
     """Final spin axis, H and spin, cost, and end time."""
-    return facts([*end_rows(plan.flight, plan.aspects), *cost(plan.pulses)])
+    pulses = plan.pulses
+    name = "impulse" if pulses.propellant is None else "propellant"
+    end = moment(pulses.end) if len(pulses) else "no pulse is needed"
+    return facts(
+        [
+            *end_rows(plan.flight, plan.aspects),
+            (name, f"{verdicts.spent(pulses)}, pulses: {len(pulses)}"),
+            ("last pulse ends", end),
+        ]
+    )
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
@@ -144,10 +129,7 @@ def lasting(flown: Flight) -> str:
     where it lasts.
     """
     spacecraft = flown.spacecraft
-    causes = [
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
+    causes = parts.changing(spacecraft)
     end = moment(flown.schedule.end if flown.until is None else flown.until)
     return f"at {end}; then changing by {' and '.join(causes)}" if causes else ""
 
@@ -156,9 +138,9 @@ def _four(value: float) -> str:
     return digits(value, 4) if value else "0"
 
 
-def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
+def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
     spacecraft = compared.spacecraft
-    least = limits(compared.spacecraft)
+    largest = limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
     aimed = spacecraft.goal.axis is not None
@@ -171,36 +153,15 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         cases = compared.verdicts[plan].cases
         return None if cases is None or not cases.final else cases.complying
 
+    def status(plan: Plan) -> str:
+        return compared.verdicts[plan].status.value
+
+    def count(plan: Plan) -> int | None:
+        return len(plan.pulses) if plan.feasible else None
+
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column(
-        "scheme", Shared.SCHEME, "", attrgetter("scheme"), where=f"{everywhere} csv", kind=TEXT
-    )
-    yield Column("feasible", "", "", attrgetter("feasible"), where="csv", kind=YES_NO)
-    yield Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO)
-    yield Column(
-        "status", "", "", lambda plan: compared.verdicts[plan].status.value, where="csv", kind=TEXT
-    )
-    yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
-    yield Column("met_fraction", "", "", share, where="csv")
-    count = _feasible(lambda plan: len(plan.pulses))
-    yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
-    yield Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE)
-    end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
-    yield Column("", "end", "s", end, to_figures(4), "screen")
-    yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
-    where = "full page csv" + " screen" * (not fuelled)
-    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, where)
-    yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
-    spent = _feasible("pulses.propellant")
-    yield Column("propellant_kg", Shared.PROPELLANT, "kg", spent, where="csv")
-    if fuelled:
-        yield Column("", Shared.PROPELLANT, "g", spent, lambda mass: _four(1e3 * mass), "full page")
-        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4, 1e3), "screen")
-    for name in ("nutation", "momentum_shift"):
-        heading = f"{name.replace('_', ' ')}, impulses (17)"
-        yield Column("", heading, "deg", angle_of(f"residual.{name}"), small_angle, "full")
     ends = ("full page", everywhere) if aimed else (everywhere, "")
     shown = {
         "nutation": everywhere,
@@ -209,82 +170,117 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         "momentum_shift": ends[0],
         "axis_error": ends[1],
     }
+    residuals = []
     for name, where in shown.items():
         heading = name.replace("_", " ")
         angle = angle_of(f"flown.{name}")
         if "screen" in where:
-            yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
-        yield Column(
-            f"{name}_deg",
-            heading,
-            "deg",
-            angle,
-            small_angle,
-            where.removeprefix("screen ") + " csv",
-        )
-    angles = (  # and their places among `angles_of`
-        {"tilt_deg": 1, "azimuth_deg": 0}
-        if spacecraft.attitude is None
-        else {"right_ascension_deg": 0, "declination_deg": 1}
-    )
-    names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
-    for at, (key, place) in enumerate(angles.items()):
-        yield Column(
-            f"axis_{key}", "", "", _feasible(partial(_direction, "axis", place)), where="csv"
-        )
-        yield Column(
+            short = shortly(largest[name != "nutation"])
+            residuals.append(Column("", heading, "", angle, short, "screen"))
+        where = f"{where.removeprefix('screen ')} csv"
+        residuals.append(Column(f"{name}_deg", heading, "deg", angle, small_angle, where))
+    axes, momenta = [], []
+    for column in parts.direction_columns(spacecraft):
+        name = SHORT_NAMES.get(column.heading, column.heading)
+        value = _feasible(partial(_direction, "axis", column))
+        where = "full page csv"
+        axes.append(Column(f"axis_{column.key}", f"axis {name}", "deg", value, column.text, where))
+        value = _feasible(partial(_direction, "momentum", column))
+        momenta.append(Column(f"momentum_{column.key}", "", "", value, where="csv"))
+    bounds = [
+        Column(
             "",
-            f"axis {names[at]}",
-            "deg",
-            _feasible(partial(_shown_direction, at)),
-            where="full page",
-        )
-    for key, place in angles.items():
-        yield Column(
-            f"momentum_{key}",
+            f"{bound.label} {verdicts.limit(bound)}",
             "",
+            _feasible(partial(_bound, bound)),
+            where="full",
+            kind=TEXT,
+        )
+        for bound in (*requirements.required(spacecraft), *requirements.cones(spacecraft))
+    ]
+    return [
+        Column.named("scheme", Shared.SCHEME, "", where=f"{everywhere} csv", kind=TEXT),
+        Column.named("feasible", "", "", where="csv", kind=YES_NO),
+        Column("recommended", "", "", lambda plan: plan is chosen, where="csv", kind=YES_NO),
+        Column("status", "", "", status, where="csv", kind=TEXT),
+        Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
+        Column("met_fraction", "", "", share, where="csv"),
+        Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE),
+        Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen"),
+        Column.named("end_s=schedule.end", "end", "s", "{:.3f}".format, "full page csv"),
+        Column.named(
+            "total_impulse_Nms=schedule.total_impulse",
+            Shared.IMPULSE,
+            "N m s",
+            _four,
+            "full page csv" if fuelled else "full page csv screen",
+        ),
+        Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv"),
+        Column.named(
+            "propellant_kg=schedule.propellant",
+            Shared.PROPELLANT,
+            "g",
+            lambda mass: _four(1e3 * mass),
+            "csv full page" if fuelled else "csv",
+        ),
+        Column(
             "",
-            _feasible(partial(_direction, "momentum", place)),
-            where="csv",
-        )
-    yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
-    if spacecraft.goal.spin is not None:
-        yield Column(
-            "", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full"
-        )
-    where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
-    yield Column(
-        "spin_change_rad_s", "spin change", "rad/s", attrgetter("spin_change"), _four, where
-    )
-    yield Column("delta_v_m_s", "", "", speed, where="csv")
-    for bound in (*requirements.required(spacecraft), *requirements.cones(spacecraft)):
-        name = f"{bound.label} {verdicts.limit(bound)}"
-        yield Column("", name, "", _feasible(partial(_bound, bound)), where="full", kind=TEXT)
-    yield Column(
-        "",
-        Shared.VERDICT,
-        "",
-        partial(scheme_verdict, compared),
-        where=everywhere,
-        kind=TEXT,
-        met=met,
-    )
-    yield Column("why", "", "", _why, where="csv", kind=TEXT)
+            Shared.PROPELLANT,
+            "g",
+            _feasible("schedule.propellant"),
+            to_figures(4, 1e3),
+            "screen" if fuelled else "",
+        ),
+        *(
+            Column("", f"{name}, impulses (17)", "deg", angle, small_angle, "full")
+            for name, angle in (
+                ("nutation", angle_of("residual.nutation")),
+                ("momentum shift", angle_of("residual.momentum_shift")),
+            )
+        ),
+        *residuals,
+        *axes,
+        *momenta,
+        Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv"),
+        Column(
+            "",
+            "final spin",
+            "rad/s",
+            _feasible("flight.settled.spin"),
+            to_figures(6),
+            "" if spacecraft.goal.spin is None else "full",
+        ),
+        Column.named(
+            "spin_change_rad_s",
+            "spin change",
+            "rad/s",
+            _four,
+            "full csv page" if any(plan.spin_change for plan in compared.plans) else "full csv",
+        ),
+        Column("delta_v_m_s", "", "", speed, where="csv"),
+        *bounds,
+        Column(
+            "",
+            Shared.VERDICT,
+            "",
+            partial(verdicts.scheme_word, compared),
+            where=everywhere,
+            kind=TEXT,
+            met=met,
+        ),
+        Column("why", "", "", _why, where="csv", kind=TEXT),
+    ]
+
+
+def _direction(which: str, angle: Column, plan: Plan) -> Any:
+    return angle.value(getattr(plan.flight.final, which))
 
 
 def _why(plan: Plan) -> str:
     from nutdamp.planning.causes import infeasibility  # the CSV file of the schemes
 
     return infeasibility(plan)
-
-
-def _direction(which: str, at: int, plan: Plan) -> float | None:
-    angle = plan.spacecraft.angles_of(getattr(plan.flight.final, which))[at]
-    return None if angle is None else math.degrees(angle)
-
-
-def _shown_direction(at: int, plan: Plan) -> str:
-    return parts.angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
 
 
 def _bound(bound: Bound, plan: Plan) -> str:
@@ -306,12 +302,10 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
     if plan is not None:
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
         ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
-        least = limits(compared.spacecraft)[0]
-        fired = (
-            parts.block_table(plan.flight)
-            if plan.pulses.blocks
-            else parts.pulse_table(plan.flight, least=least)
-        )
+        if plan.pulses.blocks:
+            fired = parts.block_table(plan.flight)
+        else:
+            fired = parts.pulse_table(plan.flight, limit=limits(compared.spacecraft)[0])
     schemes = scheme_table(compared, plan).screen("screen", between=" ")
 
     def table(first: int | None = None) -> RenderableType:
@@ -355,31 +349,30 @@ def headline(compared: Comparison) -> Text:
 def ends(plan: Plan) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     flight, spacecraft = plan.flight, plan.spacecraft
-    left = flight.residual
-    formula, (least, turn) = plan.residual, limits(spacecraft)
-    angles = [f"nutation {short_angle(left.nutation, least)}"]
-    if (
-        not spacecraft.inertia.wheel and left.body_cone < 0.5 * math.pi
-    ):  # where ω need not lie near H, cones tell nothing
-        angles += [f"body cone {short_angle(left.body_cone, least)}"]
-        angles += [f"space cone {short_angle(left.space_cone, least)}"]
-    if (
-        formula is not None
-        and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split()
-    ):
-        angles[0] += f" (17: {by_impulses})"
+    residual = flight.residual
+    limit, turn = limits(spacecraft)
+    nutation = short_angle(residual.nutation, limit)
+    angles = [f"nutation {nutation}"]
+    if plan.residual is not None:
+        by_impulses = short_angle(plan.residual.nutation, limit)
+        if by_impulses != nutation:
+            angles[0] += f" (17: {by_impulses})"
+    # Where ω need not lie near H, cones tell nothing.
+    if not spacecraft.inertia.wheel and residual.body_cone < 0.5 * math.pi:
+        angles.append(f"body cone {short_angle(residual.body_cone, limit)}")
+        angles.append(f"space cone {short_angle(residual.space_cone, limit)}")
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = parts.angle_texts(spacecraft, flight.final.axis)
-    names = parts.angle_names(spacecraft) if spacecraft.attitude is None else SHORT_NAMES
-    turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
-    turned = (
-        turned
-        if spacecraft.goal.axis is None
-        else f"{short_angle(left.axis_error, turn)} deg off target"
+    axis = ", ".join(
+        f"{SHORT_NAMES.get(column.heading, column.heading)} {column.worded(flight.final.axis)}"
+        for column in parts.direction_columns(spacecraft)
     )
+    if spacecraft.goal.axis is None:
+        momentum = f"turned by {short_angle(residual.momentum_shift, turn)} deg"
+    else:
+        momentum = f"{short_angle(residual.axis_error, turn)} deg off target"
     final = flight.final.spin
-    spin = f"; spin {final * RPM:.5g} rpm" * (not requirements.spins_at(spacecraft, final))
-    rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
+    spin = "" if requirements.spins_at(spacecraft, final) else f"; spin {final * RPM:.5g} rpm"
+    rows.append(("axis", f"{axis}; H {momentum}{spin}"))
     if len(plan.pulses) and lasting(flight):
         rows.append(("", lasting(flight)))
     return facts(rows)

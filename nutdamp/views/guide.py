@@ -127,7 +127,7 @@ NUMBER = re.compile(r"(?P<source>m|k|§)?\s*\(?\s*(?P<number>[0-9]+(\.[0-9]+)?)\
 _FIGURE = re.compile(r"(abb|fig)[a-z]*\.?-?[0-9]*")
 
 
-def found(requested: str) -> Topic:
+def topic_of(requested: str) -> Topic:
     """The page or topic by its name or by the number of an equation.
 
     Raises BadRequest, which names a near one, where there is none.
@@ -136,9 +136,11 @@ def found(requested: str) -> Topic:
     name = {"energy-sink": "dissipation", "gyrostat": "wheel"}.get(name, name)
     if name in NAMES or _FIGURE.fullmatch(name):
         return page_or_topic(name if name in NAMES else "figures")
-    if match := NUMBER.fullmatch(requested.strip().casefold()):
+    match = NUMBER.fullmatch(requested.strip().casefold())
+    if match:
+        source = "K" if match["source"] == "k" else "M"
         number = match["number"]
-        called = number if "." in number else f"{'K' if match['source'] == 'k' else 'M'}({number})"
+        called = number if "." in number else f"{source}({number})"
         if equation := next((entry for entry in EQUATIONS if entry.number == called), None):
             return equation.topic
         raise BadRequest(
@@ -152,9 +154,9 @@ def page_or_topic(name: str) -> Topic:
     return next((topic for topic in (*SCHEMES, *MOTION) if topic.name == name), None) or page(name)
 
 
-def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") -> str:
+def meant(name: str, names: tuple[str, ...], listed: str = "nutdamp explain") -> str:
     """``did you mean 'nutation'?``, or the command by which they are ``listed``."""
-    close = nearest(name, known)
+    close = nearest(name, names)
     return f"did you mean {close!r}?" if close else f"`{listed}` lists them"
 
 

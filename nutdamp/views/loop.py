@@ -43,8 +43,8 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     duration,
     lasting,
+    limit_text,
     moment,
-    most,
     note_json,
     ordered,
     quantity,
@@ -75,11 +75,10 @@ APART = "{:.1e}".format  # text of a difference
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column(
-        "channel",
+    Column.named(
+        "channel=firing.pulse.channel",
         Shared.CHANNEL,
         "",
-        lambda row: row.firing.pulse.channel,
         where="verified verified_json",
         kind=TEXT,
     ),
@@ -119,7 +118,7 @@ FIRINGS = (
     ),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     *tables.file_columns("json", "decided_s=firing.decided"),
-    Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
+    Column.named("seen_deg=firing.seen", "nutation seen", "deg", small_angle, "screen json"),
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
@@ -144,22 +143,20 @@ def firing_table(run: LoopRun) -> DataTable:
 
 
 MARGINS = (
-    Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
-    Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
+    Column.named("channel", Shared.CHANNEL, "", where="screen json", kind=TEXT),
+    Column.named("late_deg", "late", "deg", to_figures(4), "screen json"),
     *tables.file_columns("json", "latest_deg"),
-    Column(
+    Column.named(
         "gain",
         "remaining",
         "%",
-        lambda row: row.gain,
         lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0",
         "screen json",
     ),
-    Column(
+    Column.named(
         "growth",
         "growth in a period",
         "%",
-        lambda row: row.growth,
         lambda growth: f"{100.0 * (growth - 1.0):.3g}",
         "screen json",
     ),
@@ -183,13 +180,35 @@ def margin_table(rows: tuple[Margin, ...]) -> DataTable:
 def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     """The screen of ``loop``."""
     run, judged = plan.flown_run, plan.verdict
-    (_, spent), (_, end) = glance.cost(plan.flight.schedule)
-    fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
-    headline = Text.assemble(
-        "LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}"
-    )
-    head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan)]
-    head.append(verdicts.bound_table(judged).screen("screen"))
+    schedule = plan.flight.schedule
+    spent = f"{verdicts.spent(schedule)}, pulses: {len(schedule)}"
+    fired = f"{spent}, last ends at {moment(schedule.end)}" if run.fired else "no firing"
+    if run.settled is not None:
+        quiet = f"at {moment(run.settled)}"
+    elif not run.fired and not run.lost:
+        quiet = "always: it never shows the start threshold"
+    elif run.loop.stop > 0.0:
+        quiet = "never: the loop is not down to the stop threshold"
+    else:
+        quiet = "never: loop.stop is 0"
+    words = verdicts.loop_sentence(judged)
+    if run.lost:
+        full = run.stop is Ending.FULL
+        why = (
+            "limits.max_pulses is reached"
+            if full
+            else "the loop is never down to its stop threshold"
+        )
+        words = f"{verdicts.lead(judged)}: {why}"
+    if run.case is not None:
+        words = f"dispersed case {run.case} of seed {run.seed}: {words}"
+    stated = verdicts.coloured(words, judged.light)
+    head = [
+        *opening(plan.spacecraft, verbose),
+        Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {quiet}"),
+        screen_line(stopped(run)) if run.stop.fault else stated,
+        verdicts.bound_table(judged).screen("screen"),
+    ]
     return summary(
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
@@ -217,32 +236,14 @@ def _notes(plan: LoopPlan, judged: Verdict) -> Iterator[Note]:
         yield note(
             "dead-band-held", band_deg=band, cases_share=share, largest_deg=largest, at_s=when
         )
-    least = min(plan.margins, key=lambda margin: margin.delay, default=None)
-    if least is not None and least.delay >= 0.0:
-        yield note("delay-margin", margin_s=least.delay, channel=least.channel)
+    first = min(plan.margins, key=lambda margin: margin.delay, default=None)
+    if first is not None and first.delay >= 0.0:
+        yield note("delay-margin", margin_s=first.delay, channel=first.channel)
     yield note("loop-in-file", loop=described(run.loop))
     if run.case is None:
         yield note("loop-flown", until_s=run.until, seed=run.seed)
     else:
         yield note("loop-case-flown", until_s=run.until, seed=run.seed, case=run.case)
-
-
-def _verdict(plan: LoopPlan) -> Iterator[Text]:
-    run, judged = plan.flown_run, plan.verdict
-    case = "" if run.case is None else f"dispersed case {run.case} of seed {run.seed}: "
-    words = verdicts.loop_sentence(judged)
-    if run.stop.fault:
-        yield screen_line(stopped(run))
-    elif run.lost:
-        full = run.stop is Ending.FULL
-        why = (
-            "limits.max_pulses is reached"
-            if full
-            else "the loop is never down to its stop threshold"
-        )
-        yield verdicts.coloured(f"{case}{verdicts.lead(judged)}: {why}", judged.light)
-    else:
-        yield verdicts.coloured(f"{case}{words}", judged.light)
 
 
 def described(loop: Loop, *, thresholds: bool = True) -> str:
@@ -255,7 +256,11 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
         if loop.predict
         else "firings begun as the sensor shows their moment"
     )
-    band = f"; fires from {most(loop.start)} down to {most(loop.stop)}" if thresholds else ""
+    band = (
+        f"; fires from {limit_text(loop.start)} down to {limit_text(loop.stop)}"
+        if thresholds
+        else ""
+    )
     return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
 
 
@@ -307,18 +312,6 @@ def warnings(spacecraft: Spacecraft) -> Iterator[Note]:
         yield note("start-below-noise", start_deg=start, noise_deg=noise)
     elif band.noise > loop.stop > 0.0:
         yield note("stop-below-noise", stop_deg=stop, noise_deg=noise)
-
-
-def _settled(run: LoopRun) -> str:
-    if run.settled is not None:
-        return f"at {moment(run.settled)}"
-    if not run.fired and not run.lost:
-        return "always: it never shows the start threshold"
-    return (
-        "never: the loop is not down to the stop threshold"
-        if run.loop.stop > 0.0
-        else "never: loop.stop is 0"
-    )
 
 
 def verification_screen(verification: LoopVerification) -> RenderableType:
@@ -415,10 +408,8 @@ FILES, EVERYWHERE = "csv json", "screen csv json"
 
 
 HELD = (
-    Column(
-        "start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE
-    ),
-    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
+    Column.named("start_deg=thresholds.start", Shared.START, "deg", to_figures(4), EVERYWHERE),
+    Column.named("stop_deg=thresholds.stop", "stop", "deg", to_figures(4), EVERYWHERE),
     *tables.file_columns(FILES, "first_firing_s=begins"),
     Column(
         "pulses_per_day",
@@ -448,24 +439,10 @@ HELD = (
         "screen",
     ),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle("spin_rate", DAY), where=FILES),
-    Column(
-        "nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), to_figures(3), EVERYWHERE
-    ),
-    Column(
-        "nutation_high_deg",
-        "before firing",
-        "deg",
-        angle_of("cycle.high"),
-        to_figures(3),
-        EVERYWHERE,
-    ),
-    Column(
-        "nutation_largest_deg",
-        Shared.MOST,
-        "deg",
-        angle_of("cycle.largest"),
-        to_figures(3),
-        EVERYWHERE,
+    Column.named("nutation_low_deg=cycle.low", "after firing", "deg", to_figures(3), EVERYWHERE),
+    Column.named("nutation_high_deg=cycle.high", "before firing", "deg", to_figures(3), EVERYWHERE),
+    Column.named(
+        "nutation_largest_deg=cycle.largest", Shared.MOST, "deg", to_figures(3), EVERYWHERE
     ),
     Column(
         "",
@@ -502,9 +479,7 @@ HELD = (
         when=lambda budget: budget.meets_requirement is not None,
         met=lambda held: held.meets_requirement,
     ),
-    Column(
-        "meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO
-    ),
+    Column.named("meets_requirement", "", "", where=FILES, kind=YES_NO),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),
 )
 
@@ -572,9 +547,9 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
         yield note("spin-changes", change_percent=100.0 * max(changes, key=abs) * DAY / YEAR)
     if spacecraft.disturbances:
         yield note("disturbances-left-out")
-    known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
-    if known:
-        yield note("budget-accuracy", sigma=f"{100.0 * max(known):.2g} %")
+    sigmas = [row.cycle.doubt for row in budget.held if row.cycle is not None]
+    if sigmas:
+        yield note("budget-accuracy", sigma=f"{100.0 * max(sigmas):.2g} %")
     yield note("cycle-angles")
     band = next((row.band for row in budget.held if row.band is not None), None)
     if band is not None:
@@ -582,7 +557,7 @@ def _budget_notes(budget: Budget) -> Iterator[Note]:
         yield note("smallest-pulse", step_deg=step, least_deg=0.5 * step)
     for begins in dict.fromkeys(row.begins for row in budget.held):
         starts = ", ".join(
-            most(row.thresholds.start) for row in budget.held if row.begins == begins
+            limit_text(row.thresholds.start) for row in budget.held if row.begins == begins
         )
         if math.isinf(begins):
             yield note("first-firing-by-noise")

@@ -22,7 +22,7 @@ from nutdamp.control_loop.simulation import FlownLoops
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, share_interval
 from nutdamp.views import decisions, dispersion
-from nutdamp.views.dispersion import CaseRow, StudyOutput, row_json
+from nutdamp.views.dispersion import CaseRow, StudyOutput, case_row
 from nutdamp.views.loop import described
 from nutdamp.views.parts import named, summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
@@ -59,50 +59,67 @@ def _cases(study: LoopStudy, rows: Sequence[CaseRow]) -> DataTable:
     return dispersion.case_table(study, SHOWN_OUTPUTS, rows)
 
 
+def _row(study: LoopStudy, case: int, values: Array, angles: Array | None, **more: Any) -> CaseRow:
+    draws = study.draws_of(case)
+    return case_row(study, SHOWN_OUTPUTS, case, draws, values.tolist(), angles, **more)
+
+
 def _worst(results: LoopResults, count: int) -> list[CaseRow]:
-    study = results.study
-    cases = results.worst.cases[:count].tolist()
     return [
-        CaseRow(
-            case, study.draws_of(case), results.values[:, case].tolist(), results.angles[:, :, case]
-        )
-        for case in cases
+        _row(results.study, case, results.values[:, case], results.angles[:, :, case])
+        for case in results.worst.cases[:count].tolist()
     ]
 
 
 def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
-    values = study.measured(flown)[0][:, 0].tolist()
-    return CaseRow(
-        case, study.draws_of(case), values, flown.aspects[:, :, 0], flown.pilots[0].ending[0]
-    )
+    values = study.measured(flown)[0][:, 0]
+    return _row(study, case, values, flown.aspects[:, :, 0], stop=flown.pilots[0].ending[0])
 
 
-def loop_cases_brief(flown: LoopDispersion) -> RenderableType:
-    """The default screen of ``disperse --loop``: verdict, percentiles, what counts most, and the
-    worst case.
-    """
-    results = flown.core
-    notes = list[Note]()
-    for output, part in zip(
-        SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True
-    ):
-        shares = results.shares(output.name).items()  # the rest is noise
-        notes += leading(part, {in_words(name): share for name, share in shares if share >= MAIN})
-    notes += unused_notes(results.study.model.inputs.unused)
-    worst = [f"{dispersion.again(results)} (worst)"] * bool(len(results.worst.cases))
-    head = [*_title(results), *_verdicts(flown)]
-    table = _percentiles(results)
-    return summary(
-        head, lambda **_: table.screen("screen"), notes, " · ".join(["--csv cases.csv", *worst])
-    )
-
-
-def _title(results: LoopResults) -> list[RenderableType]:
-    study = results.study
+def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True) -> RenderableType:
+    """The screen of ``disperse --loop``: verdict, percentiles, main causes, and worst cases."""
+    results, study = flown.core, flown.core.study
     drawn = f"cases: {results.done:,}, seed {study.seed}"
-    drawn += f", unphysical ones drawn again: {results.redrawn:,}" if results.redrawn else ""
+    if results.redrawn:
+        drawn += f", unphysical ones drawn again: {results.redrawn:,}"
     title = named(study.spacecraft, f": loop, 0 to {duration(study.until)}, {drawn}")
-    return [title, Text(described(study.law.loop))]
+    head = [title, Text(described(study.law.loop))]
+    percentiles = dispersion.percentile_table(results, SHOWN_OUTPUTS, study.nominal)
+    unused = study.model.inputs.unused
+    if not verbose:
+        notes = list[Note]()
+        for output, part in zip(
+            SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True
+        ):
+            shares = results.shares(output.name).items()  # the rest is noise
+            main = {in_words(name): share for name, share in shares if share >= MAIN}
+            notes += leading(part, main)
+        steps = "--csv cases.csv"
+        if len(results.worst.cases):
+            steps += f" · {dispersion.again(results)} (worst)"
+        return summary(
+            [*head, *_verdicts(flown)],
+            lambda **_: percentiles.screen("screen"),
+            [*notes, *unused_notes(unused)],
+            steps,
+        )
+    angles = dispersion.angles_note(study.spacecraft)
+    parts: list[RenderableType] = [*head, Text(), percentiles.screen("full"), angles, Text()]
+    parts += [*_verdicts(flown), *_shares(results)]
+    anew = ", ".join(
+        f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
+    )
+    if anew:
+        parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
+    rows = _worst(results, worst)
+    if rows:
+        table = _cases(study, rows)
+        options = dispersion.again(results)
+        parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
+        parts.append(
+            Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
+        )
+    return Group(*parts, *unused_table(unused))
 
 
 def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
@@ -133,47 +150,12 @@ def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
     )
 
 
-def loop_cases_screen(flown: LoopDispersion, *, worst: int) -> Group:
-    """All tables of ``disperse --loop``."""
-    results, study = flown.core, flown.core.study
-    parts: list[RenderableType] = [*_title(results), Text(), _percentiles(results).screen("full")]
-    parts += [
-        dispersion.angles_note(study.spacecraft),
-        Text(),
-        *_verdicts(flown),
-        *_shares(results),
-    ]
-    anew = ", ".join(
-        f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
-    )
-    if anew:
-        parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
-    rows = _worst(results, worst)
-    if rows:
-        table = _cases(study, rows)
-        options = dispersion.again(results)
-        parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
-        parts.append(
-            Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
-        )
-    return Group(*parts, *unused_table(study.model.inputs.unused))
-
-
-def _percentiles(results: LoopResults) -> DataTable:
-    rows = []
-    for output, plan in zip(SHOWN_OUTPUTS, results.study.nominal.tolist(), strict=True):
-        distribution = results.distribution(output.name)
-        nominal = None if distribution is None else plan
-        rows.append(dispersion.percentile_row(output, nominal, distribution))
-    return DataTable("Percentiles", dispersion.PERCENTILES, rows)
-
-
 def _share(count: int, of: int) -> str:
     if not of:
         return "no case"
-    low, high = share_interval(count, of)
-    share, least, most = (percent(fraction, 0.99) for fraction in (count / of, low, high))
-    return f"{share} of cases (95 % interval {least} to {most})"
+    shares = (count / of, *share_interval(count, of))
+    share, low, high = (percent(fraction, 0.99) for fraction in shares)
+    return f"{share} of cases (95 % interval {low} to {high})"
 
 
 def _shares(results: LoopResults) -> Iterator[RenderableType]:
@@ -226,7 +208,14 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
+    nominal = case_row(
+        study,
+        SHOWN_OUTPUTS,
+        dispersion.ESTIMATE,
+        {},
+        study.nominal.tolist(),
+        study.nominal_aspects,
+    )
     table = _cases(study, [nominal, row]).transposed("case", names="")
     title = named(study.spacecraft, f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [
@@ -274,7 +263,7 @@ def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
         "unused_because": dict(study.model.inputs.unused),
-        "worst": [row_json(study, SHOWN_OUTPUTS, row) for row in _worst(results, worst)],
+        "worst": [row.data for row in _worst(results, worst)],
     }
 
 
@@ -283,7 +272,7 @@ def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, 
     row = _flown_case(study, case, flown)
     data = {"nutdamp": __version__, "seed": study.seed, "until_s": study.until}
     data |= {} if row.stop is None else {"stopped": row.stop.name.lower()}
-    return data | row_json(study, SHOWN_OUTPUTS, row)
+    return data | row.data
 
 
 def _fraction(count: int, of: int) -> dict[str, float | None]:
@@ -312,7 +301,6 @@ class LoopCasesWriter:
                 name: draw if isinstance(draw, float) else float(draw[row])
                 for name, draw in drawn.items()
             }
-            rows.append(
-                CaseRow(first + row, draws, values[:, row].tolist(), angles[..., row], stop)
-            )
+            of_case = values[:, row].tolist(), angles[..., row]
+            rows.append(case_row(self._study, SHOWN_OUTPUTS, first + row, draws, *of_case, stop))
         self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

@@ -35,24 +35,26 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     facts,
     lines_of,
     to_figures,
 )
 from nutdamp.views.text import (
     RPM,
+    WARNING,
     degrees,
     digits,
     duration,
+    limit_text,
     longitude,
     mass,
     moment,
-    most,
+    ordered,
     pointing,
     quantity,
     quiet,
-    screen_lines,
+    screen_line,
+    severity,
     short_angle,
     small_angle,
     steering,
@@ -139,7 +141,7 @@ def _valves(schedule: Schedule) -> bool:
 PEOPLE, FILES = "screen full simulate page", "csv json flown"
 PULSES = (
     Column("pulse", "pulse", "", lambda row: row.at + 1, where=f"{PEOPLE} csv", kind=WHOLE),
-    Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, FILES),
+    Column.named("t_s=pulse.t", "centre", "s", seconds, FILES),
     Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, FILES),
     Column(
         "on_time_s",
@@ -150,18 +152,17 @@ PULSES = (
         f"{PEOPLE} {FILES}",
     ),
     Column("", Shared.EFFECTIVE, "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
-    Column(
-        "",
+    Column.named(
+        "channel=pulse.channel",
         Shared.CHANNEL,
         "",
-        lambda row: channel_text(row.pulse, row.spacecraft),
-        where=PEOPLE,
+        where=f"{PEOPLE} {FILES}",
         kind=TEXT,
+        words=lambda row: channel_text(row.pulse, row.spacecraft),
     ),
-    Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where=FILES, kind=TEXT),
     _vector("torque", "Nm"),
     _vector("impulse", "Nms"),
-    Column("propellant_kg", Shared.PROPELLANT, "kg", lambda row: row.pulse.propellant, where=FILES),
+    Column.named("propellant_kg=pulse.propellant", Shared.PROPELLANT, "kg", where=FILES),
     Column(
         "",
         Shared.IMPULSE,
@@ -176,8 +177,8 @@ PULSES = (
     _cone("body_cone", "after", "simulate page flown"),
     _cone("space_cone", "before", "page flown"),
     _cone("space_cone", "after", "simulate page flown"),
-    Column("effective_start_s", "", "", lambda row: row.pulse.start, where=FILES, when=_valves),
-    Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where=FILES, when=_valves),
+    Column.named("effective_start_s=pulse.start", "", "", where=FILES, when=_valves),
+    Column.named("effective_on_time_s=pulse.on_time", "", "", where=FILES, when=_valves),
     Column(
         "utc", "", "", lambda row: row.spacecraft.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT
     ),
@@ -190,10 +191,10 @@ def commanded(schedule: Schedule, spacecraft: Spacecraft) -> DataTable:
     return DataTable("Pulses", _dated(spacecraft), rows, schedule)
 
 
-def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
+def pulse_table(flown: Flight, *, scheme: str = "", limit: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``scheme``: its name, on pages; ``least``: limit of the nutation, rad, on default screens.
+    ``scheme``: its name, on pages; ``limit``: that of the nutation, rad, on default screens.
     """
     before, after = flown.around_pulses()
     pulses, spacecraft = flown.schedule.pulses, flown.spacecraft
@@ -201,9 +202,15 @@ def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> 
     rows = [
         PulseRow(index, pulse, spacecraft, before, after, phase) for index, (pulse, phase) in phased
     ]
-    left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
-                  lambda angle: short_angle(angle, least), "screen")  # fmt: skip
-    return DataTable(f"Pulses of {scheme}", (*_dated(spacecraft), left), rows, flown.schedule)
+    nutation = Column(
+        "",
+        Shared.NUTATION_AFTER,
+        "deg",
+        lambda row: float(row.after.nutation[row.at]),
+        lambda angle: short_angle(angle, limit),
+        "screen",
+    )
+    return DataTable(f"Pulses of {scheme}", (*_dated(spacecraft), nutation), rows, flown.schedule)
 
 
 def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
@@ -259,16 +266,9 @@ def _nine(value: float) -> float:
 EVERYWHERE = "screen page csv"
 BLOCKS = (
     Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
-    Column(
-        "channel", Shared.CHANNEL, "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT
-    ),
-    Column(
-        "first_sun_pulse",
-        Shared.FIRST_SUN_PULSE,
-        "",
-        lambda row: row.block.first,
-        where=EVERYWHERE,
-        kind=WHOLE,
+    Column.named("channel=block.channel", Shared.CHANNEL, "", where=EVERYWHERE, kind=TEXT),
+    Column.named(
+        "first_sun_pulse=block.first", Shared.FIRST_SUN_PULSE, "", where=EVERYWHERE, kind=WHOLE
     ),
     Column(
         "first_utc",
@@ -278,7 +278,7 @@ BLOCKS = (
         where="csv page",
         kind=TEXT,
     ),
-    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, to_figures(6), EVERYWHERE),
+    Column.named("delay_s=block.delay", Shared.DELAY, "s", to_figures(6), EVERYWHERE),
     Column(
         "delay_counts",
         Shared.DELAY,
@@ -295,14 +295,12 @@ BLOCKS = (
         lambda angle: f"{angle:.2f}",
         EVERYWHERE,
     ),
-    Column("width_s", "width", "s", lambda row: row.block.width, to_figures(6), EVERYWHERE),
+    Column.named("width_s=block.width", "width", "s", to_figures(6), EVERYWHERE),
     Column(
         "width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE
     ),
-    Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
-    Column(
-        "every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE
-    ),
+    Column.named("count=block.count", Shared.PULSES, "", where=EVERYWHERE, kind=WHOLE),
+    Column.named("every=block.every", Shared.EVERY, "turn", where=EVERYWHERE, kind=WHOLE),
     Column(
         "impulse_Nms",
         Shared.IMPULSE,
@@ -311,13 +309,8 @@ BLOCKS = (
         to_figures(6),
         "csv page",
     ),
-    Column(
-        "nutation_after_deg",
-        Shared.NUTATION_AFTER,
-        "deg",
-        angle_of("nutation"),
-        small_angle,
-        "csv page",
+    Column.named(
+        "nutation_after_deg=nutation", Shared.NUTATION_AFTER, "deg", small_angle, "csv page"
     ),
 )
 
@@ -394,20 +387,26 @@ def summary(
 
     ``verbose``: with all rows and notes, and ``more`` parts.
     """
-    warnings, others = screen_lines(notes)
+    every = ordered(notes)
+    warnings = [screen_line(note) for note in every if severity(note) == WARNING]
+    others = [screen_line(note) for note in every if severity(note) != WARNING]
     if verbose:
         body = [Text(), table()] if table is not None else []
         for part in more:
             body += [Text(), part]
-        return Group(*head, *warnings, *body, *[Text()] * bool(others), *others)
+        if others:
+            body += [Text(), *others]
+        return Group(*head, *warnings, *body)
 
     def screen(rows: int, count: int) -> Group:
         body = [Text(), table(first=rows)] if table is not None else []
         if quiet():
             return Group(*head, *warnings, *body)
+        if body:
+            body.append(Text())
         hidden = f" ({len(others) - count} more)" if len(others) > count else ""
         last = Text(f"-v all values{hidden} · {steps}", style="dim")
-        return Group(*head, *warnings, *body, *[Text()] * bool(body), *others[:count], last)
+        return Group(*head, *warnings, *body, *others[:count], last)
 
     for size in SIZES[:-1]:
         if lines_of(shown := screen(*size)) <= LINES:
@@ -444,11 +443,9 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
         start = pulse.loaded[0]
         dated = spacecraft.utc(start, 3)
         yield name, f"starts at {moment(start)}" + (f", {dated}" if dated else "")
-    turned = (
-        angle_texts(spacecraft, momentum) for momentum in (spacecraft.momentum, final.momentum)
-    )
-    for name, *ends in zip(angle_names(spacecraft), *turned, strict=True):
-        yield f"H: {name}", " to ".join(ends)
+    for column in direction_columns(spacecraft):
+        begin, end = map(column.worded, (spacecraft.momentum, final.momentum))
+        yield f"H: {column.heading}", f"{begin} to {end}"
     assert spacecraft.sun is not None
     aspects = (
         attitude.angle_between(momentum, spacecraft.sun)
@@ -489,35 +486,37 @@ def named(spacecraft: Spacecraft, *more: str | tuple[str, str]) -> Text:
     """Name of a spacecraft, with a word where it is one that nobody asked for, and ``more`` text
     after it.
     """
-    return Text.assemble(
-        (spacecraft.name, "bold"), " (built-in example)" * spacecraft.built_in, *more
-    )
+    origin = " (built-in example)" if spacecraft.built_in else ""
+    return Text.assemble((spacecraft.name, "bold"), origin, *more)
 
 
-def angle_names(spacecraft: Spacecraft) -> tuple[str, str]:
-    """Names of the two angles of a direction: along and above the equator, or from H(0) and about
-    it.
+def direction_columns(spacecraft: Spacecraft) -> tuple[Column, Column]:
+    """The two angles of an inertial direction (3,): along and above the equator, or from H(0) and
+    about it.
     """
-    return (
-        ("tilt", "azimuth") if spacecraft.attitude is None else ("right ascension", "declination")
-    )
 
+    def angle(at: int, direction: Vector) -> float | None:
+        value = spacecraft.angles_of(direction)[at]
+        return None if value is None else math.degrees(value)
 
-def angle_texts(spacecraft: Spacecraft, direction: Vector) -> tuple[str, str]:
-    """The two angles of an inertial direction (3,), in the order of `angle_names`."""
-    around, other = spacecraft.angles_of(direction)
+    around = partial(angle, 0)
+    other = partial(angle, 1)
+    if spacecraft.attitude is None:
+        return (
+            Column("tilt_deg", "tilt", "deg", other, pointing, "json"),
+            Column("azimuth_deg", "azimuth", "deg", around, longitude, "json"),
+        )
     return (
-        (pointing(other), longitude(around))
-        if spacecraft.attitude is None
-        else (longitude(around), pointing(other))
+        Column("right_ascension_deg", "right ascension", "deg", around, longitude, "json"),
+        Column("declination_deg", "declination", "deg", other, pointing, "json"),
     )
 
 
 def direction_text(spacecraft: Spacecraft, direction: Vector) -> str:
     """An inertial direction (3,) by name and number of its angles."""
-    names = angle_names(spacecraft)
-    texts = angle_texts(spacecraft, direction)
-    return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
+    return ", ".join(
+        f"{column.heading} {column.worded(direction)}" for column in direction_columns(spacecraft)
+    )
 
 
 def spin_text(spin: float) -> str:
@@ -543,9 +542,9 @@ def aspect_facts(aspects: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
 
 def bounds_text(keep: Keep) -> str:
     """Limits of the spin axis to a direction; empty where it is only watched."""
-    least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
-    largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
-    return " and ".join(filter(None, (least, largest)))
+    inner = f"at least {limit_text(keep.least)}" if keep.least > 0.0 else ""
+    outer = f"at most {limit_text(keep.most)}" if keep.most < math.pi else ""
+    return " and ".join(filter(None, (inner, outer)))
 
 
 def requested(spacecraft: Spacecraft) -> str:
@@ -562,7 +561,7 @@ def required(spacecraft: Spacecraft) -> str:
             spin = (spacecraft.goal.spin or 0.0) * RPM
             texts.append(f"spin within {RPM * bound.limit:.4g} rpm of {spin:.5g} rpm")
         else:
-            texts.append(f"{bound.label} within {most(bound.limit)}")
+            texts.append(f"{bound.label} within {limit_text(bound.limit)}")
     return listed(texts)
 
 
@@ -588,10 +587,8 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if inertia.wheel:
         whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
         yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
-    yield (
-        "spin",
-        spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.sense < 0.0),
-    )
+    reversed_ = ": the spin axis is body axis -3" if spacecraft.sense < 0.0 else ""
+    yield "spin", f"{spin_text(spacecraft.spin)}{reversed_}"
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
     yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
@@ -603,22 +600,19 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
         yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
-    causes = [  # that break the floors A|ω0| and C|ω3|β
-        *["I1 ≠ I2"] * (not inertia.symmetric),
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
-    beyond = " and ".join(causes)
+    # Causes that break the floors A|ω0| and C|ω3|β.
+    unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
+    beyond = " and ".join([*unequal, *changing(spacecraft)])
     floor = f"no least impulse with {beyond}" if beyond else "lower bound"
     name = "impulse" if beyond else "least impulse"
     yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
     if spacecraft.goal.axis is not None:
         symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
-        there = spacecraft.to_turn < NO_NUTATION  # but for rounding
-        turn = quantity(0.0 if there else spacecraft.turning_impulse, "N m s")
-        least = "" if beyond else ", the least to turn H"
+        turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
+        turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
+        bound = "" if beyond else ", the least to turn H"
         yield "target", direction_text(spacecraft, spacecraft.goal.axis)
-        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{least}"
+        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{bound}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
     actuators = []
@@ -630,10 +624,21 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     if spacecraft.channels:
         actuators.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
     yield "actuators", "; ".join(actuators)
-    if text := required(spacecraft):
-        yield "requirement", text
+    bounds = required(spacecraft)
+    if bounds:
+        yield "requirement", bounds
     if any(bound.part is Part.DISTANCE for bound in requirements.required(spacecraft)):
         yield "", "momentum_shift bounds the axis error: the angle of H from the target"
+
+
+def changing(spacecraft: Spacecraft) -> list[str]:
+    """Causes that change the motion while nothing fires."""
+    causes = []
+    if spacecraft.growth != 0.0:
+        causes.append("dissipation")
+    if spacecraft.disturbances:
+        causes.append("disturbances")
+    return causes
 
 
 def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:

@@ -23,7 +23,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     file_columns,
     to_figures,
     values_of,
@@ -82,8 +81,8 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
     fly, and its cost.
     """
     chosen, fresh, cost, needed = robust.chosen, robust.fresh, robust.cost, robust.tightening
-    given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
-    entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
+    plans = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
+    entries = dict(zip(map(id, plans), _table(robust, plans).json(), strict=True))
     return {
         **values_of(robust, "probability"),
         "target": target_json(robust.comparison.spacecraft),
@@ -122,61 +121,54 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
 
 
 def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
+    """One row a candidate; ``full``: of the screen, with propellant only where all have it."""
     mark = next((index for index, entry in enumerate(candidates) if entry is robust.chosen), None)
-    return DataTable("Candidates", tuple(_columns(robust)), candidates, robust, mark)
-
-
-def _columns(robust: RobustComparison) -> Iterator[Column]:
-    """Columns of the candidates; ``full``: of the screen,
-    with propellant only where all have it.
-    """
-    spacecraft = robust.comparison.spacecraft
     level = exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
-    yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
-    yield from file_columns("json", "variant")
-    yield Column(
-        "",
-        "variant",
-        "",
-        lambda row: row.variant + " *" * (row is robust.usual),
-        where="full",
-        kind=TEXT,
-    )
-    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json")
-    yield Column(
-        "end_s",
-        Shared.END,
-        "s",
-        attrgetter("plan.pulses.end"),
-        lambda end: f"{end:.3f}",
-        "full json",
-    )
-    impulse = attrgetter("plan.pulses.total_impulse")
-    where = "json" if fuelled else "full json"
-    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
-    yield from file_columns("json", "propellant_kg=plan.pulses.propellant")
-    yield Column(
-        "",
-        Shared.PROPELLANT,
-        "g",
-        attrgetter("plan.pulses.propellant"),
-        to_figures(4, 1e3),
-        "full" * fuelled,
-    )
-    yield from file_columns("json", "nominal_nutation_deg=plan.flown.nutation", "left_deg=left")
-    yield Column("", Shared.NOMINAL, "deg", angle_of("plan.flown.nutation"), small_angle, "full")
-    yield Column("", level, "deg", angle_of("left"), small_angle, "full")
-    yield from file_columns("json", "samples=cases.samples", "met_fraction=cases.complying")
-    yield Column(
-        "",
-        "cases that comply",
-        "",
-        attrgetter("cases"),
-        share_text,
-        "full" * requirements.judged(spacecraft),
-    )
-    yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
+    judged = requirements.judged(robust.comparison.spacecraft)
+
+    def variant(row: FlownPlan) -> str:
+        return f"{row.variant} *" if row is robust.usual else row.variant
+
+    columns = [
+        Column.named("scheme=plan.scheme", "plan", "", where="full json", kind=TEXT),
+        Column.named("variant", "variant", "", where="full json", kind=TEXT, words=variant),
+        Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json"),
+        Column.named("end_s=plan.pulses.end", Shared.END, "s", "{:.3f}".format, "full json"),
+        Column.named(
+            "total_impulse_Nms=plan.pulses.total_impulse",
+            Shared.IMPULSE,
+            "N m s",
+            to_figures(4),
+            "json" if fuelled else "full json",
+        ),
+        Column.named(
+            "propellant_kg=plan.pulses.propellant",
+            Shared.PROPELLANT,
+            "g",
+            to_figures(4, 1e3),
+            "full json" if fuelled else "json",
+        ),
+        Column.named(
+            "nominal_nutation_deg=plan.flown.nutation",
+            Shared.NOMINAL,
+            "deg",
+            small_angle,
+            "full json",
+        ),
+        Column.named("left_deg", level, "deg", small_angle, "full json"),
+        *file_columns("json", "samples=cases.samples", "met_fraction=cases.complying"),
+        Column(
+            "",
+            "cases that comply",
+            "",
+            attrgetter("cases"),
+            share_text,
+            "full" if judged else "",
+        ),
+        Column("final", "", "", lambda row: final_json(row.plan.flight), where="json"),
+    ]
+    return DataTable("Candidates", columns, candidates, robust, mark)
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:
@@ -186,17 +178,17 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     ]
     rest = len(robust.candidates) - len(named)
     level = exact_percent(robust.probability)
-    pointed = robust.comparison.spacecraft.goal.axis is not None
-    left = "nutation" + " or axis error" * pointed
-    notes = [
-        *[f"Plans that rank below these: {rest}."] * bool(rest),
-        *["Losing plans stopped early."] * any(not entry.final for entry in robust.candidates),
-        (
-            f"nominal, {level}: the {left} left with nominal values, "
-            "and not exceeded in so many cases."
-        ),
-        *["* is recommended without --robust."] * (robust.usual is not None),
-    ]
+    free = robust.comparison.spacecraft.goal.axis is None
+    residual = "nutation" if free else "nutation or axis error"
+    notes = [] if not rest else [f"Plans that rank below these: {rest}."]
+    if any(not entry.final for entry in robust.candidates):
+        notes.append("Losing plans stopped early.")
+    notes.append(
+        f"nominal, {level}: the {residual} left with nominal values, "
+        "and not exceeded in so many cases."
+    )
+    if robust.usual is not None:
+        notes.append("* is recommended without --robust.")
     return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
 
 

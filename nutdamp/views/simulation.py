@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -29,8 +28,7 @@ from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.notes import TELLING, verdict_notes
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.simulation import Simulation, model_warnings
+from nutdamp.planning.simulation import Simulation, Verified, model_warnings
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
@@ -42,14 +40,12 @@ from nutdamp.views.tables import (
     WHOLE,
     Column,
     DataTable,
-    FittedColumns,
     Shared,
     angle_of,
     facts,
     to_figures,
 )
 from nutdamp.views.text import (
-    MISSING,
     degrees,
     longitude,
     moment,
@@ -64,39 +60,38 @@ MODELS = {
 }  # names of the two models
 
 
-def _direction(name: str, at: int, flight: Flight) -> str:
-    return parts.angle_texts(flight.spacecraft, getattr(flight.final, name))[at]
-
-
-def _columns(simulation: Simulation) -> Iterator[Column]:
+def _end_table(simulation: Simulation) -> DataTable:
+    """End of the track by both models."""
     spacecraft = simulation.flown.spacecraft
-    yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
-    names = [
-        "nutation",
-        "body_cone",
-        "space_cone",
-        "momentum_shift",
-        *["axis_error"] * (spacecraft.goal.axis is not None),
-    ]
-    for name in names:
-        yield Column(
-            "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
-        )
-    for heading, name in (("spin axis", "axis"), ("H", "momentum")):
-        for at, angle in enumerate(parts.angle_names(spacecraft)):
-            yield Column(
-                "", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen"
+
+    def direction(name: str, angle: Column) -> Callable[[Flight], str]:
+        return lambda flight: angle.worded(getattr(flight.final, name))
+
+    residuals = ["nutation", "body_cone", "space_cone", "momentum_shift"]
+    if spacecraft.goal.axis is not None:
+        residuals.append("axis_error")
+    columns = [
+        Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT),
+        *(
+            Column(
+                "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"
             )
-    yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
+            for name in residuals
+        ),
+        *(
+            Column("", f"{heading}: {angle.heading}", "", direction(name, angle), where="screen")
+            for heading, name in (("spin axis", "axis"), ("H", "momentum"))
+            for angle in parts.direction_columns(spacecraft)
+        ),
+        Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen"),
+    ]
+    return DataTable("", columns, (simulation.impulses, simulation.flown))
 
 
 def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
     """The screen of ``simulate``."""
-    judged, spacecraft, extremes = (
-        simulation.verdict,
-        simulation.flown.spacecraft,
-        simulation.extremes,
-    )
+    judged, extremes = simulation.verdict, simulation.extremes
+    spacecraft = simulation.flown.spacecraft
     pulses = simulation.flown.schedule
     fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
@@ -107,7 +102,7 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
         verdicts.coloured(*verdicts.stated(judged)),
     ]
     head += [verdicts.bound_table(judged).screen("screen")] if judged.lines else []
-    ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
+    ends = _end_table(simulation)
     return parts.summary(
         head,
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
@@ -164,31 +159,24 @@ def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
     )
     if spacecraft.attitude is not None:
         frame = spacecraft.attitude.frame or "the frame of the file"
-        west, east = map(longitude, extremes.right_ascension)
-        yield (
-            "right ascension",
-            f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y",
-        )
+        west, east = (longitude(math.degrees(angle)) for angle in extremes.right_ascension)
+        yield "right ascension", f"{west} to {east} deg in {frame}, from its axis x towards y"
         yield "declination", _range(extremes.declination)
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
     yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
 
 
 def _range(values: tuple[float, float]) -> str:
-    low, high = map(pointing, values)
-    return f"{low.removesuffix(' deg')} to {high}"
+    low, high = (pointing(math.degrees(angle)) for angle in values)
+    return f"{low} to {high} deg"
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
     """Pulses with the cone angles around them, ends of both models, and extremes of the axis track
     in degrees.
     """
-    flight, extremes, impulses, flown = (
-        simulation.shown,
-        simulation.extremes,
-        simulation.impulses,
-        simulation.flown,
-    )
+    flight, extremes = simulation.shown, simulation.extremes
+    impulses, flown = simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
     return {
         **decisions.heading(flight.spacecraft),
@@ -250,8 +238,8 @@ def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], st
 
 
 SPINS = (
-    Column("spin", "", "", attrgetter("number"), where="csv", kind=WHOLE),
-    Column("start_utc", "", "", attrgetter("utc"), where="csv", kind=TEXT),
+    Column.named("spin=number", "", "", where="csv", kind=WHOLE),
+    Column.named("start_utc=utc", "", "", where="csv", kind=TEXT),
     Column("start_s", "", "", lambda row: round(row.begin, DIGITS), where="csv"),
     Column("period_s", "", "", lambda row: round(row.period, DIGITS), where="csv"),
     Column("pulses", "", "", lambda row: len(row.fired), where="csv", kind=WHOLE),
@@ -380,8 +368,33 @@ BUDGET_NOTE = (  # note on `budget_table`
 )
 
 
-def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
-    """The default screen of ``verify``: verdict, requirement, methods."""
+def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
+    """The screen of ``verify``: verdict, methods, and what each imperfection leaves."""
+    plan, verification = verified.plan, verified.core
+    spacecraft, judged = plan.spacecraft, plan.verdict
+    confirmed = Light.GREEN if verification.agree else Light.RED
+    lead, about = verdicts.headline(judged)
+    head = [
+        parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion"),
+        verdicts.coloured(verdict(verification), confirmed),
+        Text.assemble((lead, verdicts.STYLES[judged.light]), about),
+        verdicts.coloured(verdicts.statement(judged), judged.light),
+    ]
+    missing = [
+        note("method-missing", method=method.name, why=method.missing)
+        for method in verification.methods
+        if method.missing
+    ]
+    methods = methods_table(verification).screen("screen")
+    if verbose:
+        return Group(
+            *head,
+            *(Text(), parts.derived_table(spacecraft)),
+            *(Text(), methods),
+            *(Text(), *map(screen_line, (*missing, conservation(verification)))),
+            *(Text(), Text(BUDGET, "bold"), Text()),
+            *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
+        )
     notes = [conservation(verification)]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
     # impulses.
@@ -390,56 +403,20 @@ def verification_brief(plan: Plan, verification: Verification) -> RenderableType
         for row in verification.budget
         if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name
     ]
-    most = max(single, key=lambda row: row.nutation, default=None)
-    if most is not None and most.nutation - verification.budget[0].nutation > SHOWN:
-        notes.append(
-            note(
-                "largest-imperfection",
-                imperfection=most.name,
-                nutation_deg=math.degrees(most.nutation),
-            )
-        )
-    notes += _missing(verification)
-    return parts.summary(
-        [*_head(plan, verification)],
-        lambda **_: methods_table(verification),
-        notes,
-        "--json verified.json",
-    )
+    worst = max(single, key=lambda row: row.nutation, default=None)
+    if worst is not None and worst.nutation - verification.budget[0].nutation > SHOWN:
+        angle = math.degrees(worst.nutation)
+        notes.append(note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
+    return parts.summary(head, lambda **_: methods, [*notes, *missing], "--json verified.json")
 
 
-def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
-    """Title, verdict, and the residual of the flown motion beside the requirement."""
-    spacecraft = plan.spacecraft
-    yield parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion")
-    yield verdicts.coloured(verdict(verification), Light.GREEN if verification.agree else Light.RED)
-    judged = plan.verdict
-    lead, about = verdicts.headline(judged)
-    yield Text.assemble((lead, verdicts.STYLES[judged.light]), about)
-    yield verdicts.coloured(verdicts.statement(judged), judged.light)
-
-
-def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
-    """All tables of ``verify``."""
-    spacecraft = plan.spacecraft
-    return Group(
-        *_head(plan, verification),
-        *(Text(), parts.derived_table(spacecraft)),
-        *(Text(), methods_table(verification)),
-        *(Text(), *map(screen_line, (*_missing(verification), conservation(verification)))),
-        *(Text(), Text(BUDGET, "bold")),
-        *(Text(), budget_table(spacecraft, verification), Text(BUDGET_NOTE, "dim")),
-    )
-
-
-def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
-    """Methods with their differences from the motion of ``flown`` (rad), conservation, error
-    budget.
-    """
+def verification_json(verified: Verified) -> dict[str, Any]:
+    """Methods with their differences from the flown motion (rad), conservation, error budget."""
+    flown, verification = verified.plan.flight, verified.core
     spacecraft = flown.spacecraft
     return {
         **decisions.heading(spacecraft),
-        "scheme": name,
+        "scheme": verified.plan.scheme,
         "agree": verification.agree if verification.checks else None,
         "disagreeing": list(verification.disagreeing),
         "final": decisions.final_json(flown),
@@ -449,40 +426,29 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
             verification, "momentum_drift=momentum.drift", "momentum_kept=momentum.kept"
         ),
         **tables.values_of(verification, "energy_drift=energy.drift", "energy_kept=energy.kept"),
-        "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
+        "budget": budget_table(spacecraft, verification).json(),
     }
 
 
-def _difference(value: float | None) -> str:
-    if value is None:
-        return MISSING
-    return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
+def _difference(value: float) -> str:
+    if value == 0.0:
+        return "0"
+    return "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
-NUTATION = Column(
-    "nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"
-)
+NUTATION = Column.named("nutation_deg", Part.NUTATION.label, "deg", small_angle, "json screen")
 METHODS = (
-    Column("name", "method", "", attrgetter("name"), where="json screen", kind=TEXT),
+    Column.named("name", "method", "", where="json screen", kind=TEXT),
     NUTATION,
-    Column(
-        "momentum_shift_deg",
-        Part.SHIFT.label,
-        "deg",
-        angle_of("momentum_shift"),
-        small_angle,
-        "json screen",
-    ),
-    Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
-    Column(
-        "momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"
-    ),
-    Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, "json screen"),
-    Column("result_difference", "", "", attrgetter("result"), where="json"),
+    Column.named("momentum_shift_deg", Part.SHIFT.label, "deg", small_angle, "json screen"),
+    Column.named("axis_difference_rad=axis", "Δaxis", "rad", _difference, "json screen"),
+    Column.named("momentum_difference_rad=momentum", "ΔH", "rad", _difference, "json screen"),
+    Column.named("rate_difference=rate", "Δrates", "relative", _difference, "json screen"),
+    Column.named("result_difference=result", "", "", where="json"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )
 IMPERFECTIONS = (
-    Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
+    Column.named("imperfection=name", "imperfection", "", where="json screen", kind=TEXT),
     NUTATION,
     *tables.file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",
@@ -493,24 +459,19 @@ IMPERFECTIONS = (
 )  # fmt: skip
 
 
-def methods_table(verification: Verification) -> FittedColumns:
+def methods_table(verification: Verification) -> DataTable:
     """One row a way to fly the schedule: its residuals,
     and its difference from the flown motion.
     """
     rows = [method for method in verification.methods if not method.missing]
-    return DataTable("Methods", METHODS, rows).screen("screen")
+    return DataTable("Maximum differences from the flown motion", METHODS, rows)
 
 
-def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedColumns:
+def budget_table(spacecraft: Spacecraft, verification: Verification) -> DataTable:
     """One row an imperfection: residuals with it alone; then residuals without each effect that
     plans include.
     """
-    return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft).screen("screen")
-
-
-def _missing(verification: Verification) -> list[Note]:
-    absent = ((method.name, method.missing) for method in verification.methods if method.missing)
-    return [note("method-missing", method=name, why=why) for name, why in absent]
+    return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft)
 
 
 def verdict(verification: Verification) -> str:

@@ -129,22 +129,22 @@ def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[i
     """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None
     without ``room``.
     """
-    least = [
+    words = [
         max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0)
         for texts in columns
     ]
-    whole, rows = ([_longest(texts[begin:]) for texts in columns] for begin in (0, 1))
+    whole = [_longest(texts) for texts in columns]
+    rows = [_longest(texts[1:]) for texts in columns]
     widths = [
-        most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)
+        line if keep else word for word, line, keep in zip(words, whole, unbroken, strict=True)
     ]
     spare = room - sum(widths)
     if spare < 0:
         return None
+    # Names of rows are widened first, then reasons, which stand last.
+    order = (0, *range(len(widths) - 1, 0, -1))
     for wanted in (rows, whole):  # a heading is broken before a row is
-        for at in (
-            0,
-            *range(len(widths) - 1, 0, -1),
-        ):  # names of rows first, then reasons, which stand last
+        for at in order:
             wider = max(min(wanted[at] - widths[at], spare), 0)
             widths[at] += wider
             spare -= wider
@@ -169,6 +169,8 @@ def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
 TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
+
+COLOURS = {None: "", True: "green", False: "bold red"}  # of a cell, by `Column.met`
 
 UNIT = re.compile(
     r"_(deg|rad_s|s|kg|Nms?|kgm2|Pa)$"
@@ -207,7 +209,7 @@ def values_of(source: Any, *names: str) -> dict[str, Any]:
 
 def file_columns(where: str, *names: str) -> list[Column]:
     """Columns of numbers in files alone, with names as in `values_of`."""
-    return [Column(key, "", "", value, where=where) for key, value in map(_named_value, names)]
+    return [Column.named(name, "", "", where=where) for name in names]
 
 
 def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:
@@ -221,9 +223,9 @@ class Column(NamedTuple):
     ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV
     has in columns of their own. ``value`` of a row in the unit of the key, or of the heading
     without a key; None where it is not known. ``text``: the value as people read it, in the unit of
-    screens. ``where``: the places that have the column, separated by blanks. ``when``: tables that
-    have it, by their source, else all. ``met``: whether a requirement is met, where a verdict is
-    coloured.
+    screens; ``words``: where that takes more than the value, the text of a row. ``where``: the
+    places that have the column, separated by blanks. ``when``: tables that have it, by their
+    source, else all. ``met``: whether a requirement is met, where a verdict is coloured.
     """
 
     key: str
@@ -235,6 +237,36 @@ class Column(NamedTuple):
     when: Callable[[Any], bool] | None = None
     kind: str = REAL
     met: Callable[[Any], bool | None] | None = None
+    words: Callable[[Any], str | None] | None = None
+
+    @classmethod
+    def named(
+        cls,
+        name: str,
+        heading: str,
+        unit: str,
+        text: Callable[[Any], str] = str,
+        where: str = "",
+        **more: Any,
+    ) -> Column:
+        """Column whose key and value are those of `values_of` by a ``name``."""
+        key, value = _named_value(name)
+        return cls(key, heading, unit, value, text, where, **more)
+
+    def shown(self, row: Any) -> str:
+        """The value of a row as people read it."""
+        if self.words is not None:
+            return self.words(row) or MISSING
+        value = self.value(row)
+        if value is None:
+            return MISSING
+        factor = screen_unit(self.unit)[1]
+        return self.text(value if factor == 1.0 else np.multiply(factor, value))
+
+    def worded(self, row: Any) -> str:
+        """The value of a row with its unit."""
+        text = self.shown(row)
+        return text if text == MISSING else f"{text} {screen_unit(self.unit)[0]}"
 
     def headed(self, between: str) -> str:
         """Heading and unit of screens."""
@@ -263,21 +295,23 @@ class DataTable:
 
     def at(self, place: str) -> list[Column]:
         """Columns that a place has."""
-        there = (column for column in self.columns if place in column.where.split())
-        return [column for column in there if column.when is None or column.when(self.source)]
+        return [
+            column
+            for column in self.columns
+            if place in column.where.split() and (column.when is None or column.when(self.source))
+        ]
 
     def headings(self, place: str) -> tuple[Heading, ...]:
         """Headings for people."""
-        shown = self.at(place)
         return tuple(
             Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT)
-            for column in shown
+            for column in self.at(place)
         )
 
     def cells(self, place: str) -> tuple[tuple[str, ...], ...]:
         """Texts for people, row by row."""
         shown = self.at(place)
-        return tuple(tuple(_text(column, row) for column in shown) for row in self.rows)
+        return tuple(tuple(column.shown(row) for column in shown) for row in self.rows)
 
     def screen(self, place: str, *, between: str = "\n", first: int | None = None) -> FittedColumns:
         """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones
@@ -287,9 +321,7 @@ class DataTable:
         headed = [(column.headed(between), column) for column in shown]
         text = tuple(name for name, column in headed if column.kind == TEXT)
         table = columns(*(name for name, _ in headed), text=text)
-        cells = {
-            name: [_text(column, row) for row in self.rows] for name, column in headed if column.met
-        }
+        cells = {name: list(map(column.shown, self.rows)) for name, column in headed if column.met}
         table.whole = tuple(
             name for name, texts in cells.items() if max(map(len, texts), default=0) <= SHORT
         )
@@ -310,15 +342,14 @@ class DataTable:
 
     def _cell(self, column: Column, row: Any, index: int, first: bool) -> Text:
         met = None if column.met is None else column.met(row)
-        style = "" if met is None else "green" if met else "bold red"
-        return Text(_text(column, row), "bold" if first and index == self.mark else style)
+        return Text(column.shown(row), "bold" if first and index == self.mark else COLOURS[met])
 
     def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
         """Quantities down and rows across, named by the first column; ``corner``: heading,
         ``names``: their style.
         """
         name, *shown = self.at(place)
-        table = columns(corner, *(_text(name, row) for row in self.rows))
+        table = columns(corner, *map(name.shown, self.rows))
         for column in shown:
             cells = (
                 self._cell(column, row, index, first=False) for index, row in enumerate(self.rows)
@@ -368,15 +399,6 @@ class DataTable:
             kinds,
             [tuple(part for column in shown for part in _parts(column, row)) for row in self.rows],
         )
-
-
-def _text(column: Column, row: Any) -> str:
-    value, (_, factor) = column.value(row), screen_unit(column.unit)
-    return (
-        MISSING
-        if value is None
-        else column.text(value if factor == 1.0 else np.multiply(factor, value))
-    )
 
 
 def _names(column: Column) -> list[str]:

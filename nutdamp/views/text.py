@@ -96,11 +96,11 @@ def short_angle(angle: float | None, largest: float = math.inf) -> str:
     """
     if angle is None or math.isnan(angle):
         return MISSING
-    least = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
-    return "0" if abs(math.degrees(angle)) < least else f"{math.degrees(angle):.3g}"
+    rounding = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
+    return "0" if abs(math.degrees(angle)) < rounding else f"{math.degrees(angle):.3g}"
 
 
-def most(angle: float) -> str:
+def limit_text(angle: float) -> str:
     """The bound of an angle, given in rad, in degrees: as it was given, however small."""
     return f"{math.degrees(angle):.4g} deg"
 
@@ -159,18 +159,14 @@ def vector(components: Iterable[float]) -> str:
     return "(" + ", ".join(f"{part:.4g}" for part in cleaned(list(components)).tolist()) + ")"
 
 
-def pointing(angle: float | None) -> str:
-    """An angle of a direction given in rad, in degrees to four decimals,
-    as every place shows it.
-    """
-    return MISSING if angle is None else f"{fixed(math.degrees(angle), 4)} deg"
+def pointing(angle: float) -> str:
+    """An angle of a direction given in degrees, to four decimals, as every place shows it."""
+    return fixed(angle, 4)
 
 
-def longitude(angle: float | None) -> str:
-    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; a direction at the
-    pole has none.
-    """
-    return MISSING if angle is None else f"{fixed(math.degrees(angle) % 360.0, 4, 360.0)} deg"
+def longitude(angle: float) -> str:
+    """A right ascension or azimuth given in degrees, from 0 to below 360."""
+    return fixed(angle % 360.0, 4, 360.0)
 
 
 def steering(impulse: Sequence[float]) -> str:
@@ -183,7 +179,8 @@ def steering(impulse: Sequence[float]) -> str:
 def fixed(value: float, digits: int, period: float = math.inf) -> str:
     """A number with so many decimals, without -0; one that rounds up to ``period`` is 0."""
     rounded = round(value, digits)
-    return f"{0.0 if rounded >= period else rounded + 0.0:.{digits}f}"
+    turned = 0.0 if rounded >= period else rounded + 0.0
+    return f"{turned:.{digits}f}"
 
 
 WARNING, NOTE, REASON = "warning", "note", "reason"
@@ -311,14 +308,6 @@ def ordered(notes: Iterable[Note]) -> list[Note]:
     every = [alike.of(listed(schemes)) if schemes else alike for alike, schemes in merged.items()]
     shown = [entry for entry in every if severity(entry) == WARNING or not quiet()]
     return sorted(shown, key=lambda note: severity(note) != WARNING)
-
-
-def screen_lines(notes: Iterable[Note]) -> tuple[list[Text], list[Text]]:
-    """Lines of warnings, and of other notes, without repetition."""
-    every = ordered(notes)
-    first = sum(severity(note) == WARNING for note in every)
-    lines = list(map(screen_line, every))
-    return lines[:first], lines[first:]
 
 
 def joined(notes: Iterable[Note]) -> str:

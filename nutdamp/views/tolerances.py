@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 from rich.console import RenderableType
@@ -15,13 +15,12 @@ from rich.text import Text
 
 from nutdamp.common.results import Note, note
 from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
-from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
-from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
+from nutdamp.views.tables import REAL, TEXT, Column, DataTable, FittedColumns, Shared, facts
 from nutdamp.views.text import quantity
 
 SHOWN = {  # units for people of those of inputs, and the factor
@@ -39,115 +38,60 @@ TINY = 1e-300
 ROUNDING = 1e-12  # rad; a smaller variation is rounding
 
 
-class BudgetRow(NamedTuple):
-    """A line of the tolerance budget: one input, or several together; ``inputs``: their rows.
-
-    ``size``: one sigma or bias; ``effects``: alone on the two `budgeted_outputs`, rad; ``bias``:
-    nothing of it varies.
-    """
-
-    name: str
-    size: str
-    effects: tuple[float, float]
-    inputs: list[int]
-    bias: bool
-
-
-def _budget_rows(study: Study) -> list[BudgetRow]:
-    """The inputs that count most, the largest first, and the others together; none where nothing
-    varies.
-    """
-    inputs, first = study.model.inputs.drawn, study.first_order
-    if not any(entry.sigma for entry in inputs):
-        return []
-    outputs = dict(budgeted_outputs(study))
-    units = together(inputs, study.model.groups)
-    effects = np.array([[_effect(first, output, rows) for rows in units] for output in outputs])
-    scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
-    order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
-    named = order if len(order) <= MOST_ROWS + 1 else order[:MOST_ROWS]
-    groups = [(*_named([inputs[row] for row in units[at]]), [at]) for at in named]
-    if others := order[len(named) :]:
-        groups.append((f"{sum(len(units[at]) for at in others)} others", "", others))
-    rows = []
-    for name, size, members in groups:
-        nutation, aim = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
-        of = [row for at in members for row in units[at]]
-        rows.append(
-            BudgetRow(name, size, (nutation, aim), of, not any(inputs[row].sigma for row in of))
-        )
-    return rows
-
-
-def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
-    if len(rows) == 1:
-        return float(first.effects(output)[rows[0]])
-    return float(np.linalg.norm(first.independent(output)[:, rows]))
-
-
-def _named(entries: list[DispersedInput]) -> tuple[str, str]:
-    name, size = (
-        ", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text)
-    )
-    return (f"{name} (correlated)" if len(entries) > 1 else name), size
-
-
 def tolerance_budget(results: Results) -> list[RenderableType]:
     """Shares of the variance by input, by first order and by the cases, and the tolerances that
     count most.
     """
     study = results.study
-    rows = _budget_rows(results.study)
-    if not rows:
-        return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
     inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
-    outputs = dict(budgeted_outputs(study))
-    rest = (
-        1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs
-    )
-    shares = [
-        max(share, 0.0) * (first.sigma(output) > ROUNDING)
-        for share, output in zip(rest, outputs, strict=True)
-    ]
+    if not any(entry.sigma for entry in inputs):
+        return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
+    outputs = budgeted_outputs(study)
+    units = together(inputs, study.model.groups)  # places of inputs that vary together
 
-    def linear(output: str, row: BudgetRow) -> str:
-        return (
-            "bias"
-            if row.bias
-            else _percent(float(first.shares(output)[row.inputs].sum()))
-            if row.inputs
-            else ""
-        )
+    def effect(output: str, places: list[int]) -> float:
+        if len(places) == 1:
+            return float(first.effects(output)[places[0]])
+        return float(np.linalg.norm(first.independent(output)[:, places]))
 
-    def seen(at: int, output: str, row: BudgetRow) -> str:
-        cases = math.fsum(
-            sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs
-        )
-        return "" if row.bias else _percent(cases if row.inputs else shares[at])
-
-    def effect(at: int, row: BudgetRow) -> str:
-        return f"{math.degrees(row.effects[at]):.3g}" if row.inputs else ""
-
+    # The units that count most, the largest first, and the others in one row.
+    effects = np.array([[effect(output, places) for places in units] for output, _ in outputs])
+    scales = np.array([[max(first.sigma(output), TINY)] for output, _ in outputs])
+    order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
+    count = len(order) if len(order) <= MOST_ROWS + 1 else MOST_ROWS
+    groups = [[unit] for unit in order[:count]]
+    if order[count:]:
+        groups.append(order[count:])
+    rows = []
+    for members in groups:
+        places = [place for unit in members for place in units[unit]]
+        entries = [inputs[place] for place in places]
+        name = ",\n".join(in_words(entry.name) for entry in entries)
+        row = [f"{name} (correlated)" if len(entries) > 1 else name]
+        row.append(",\n".join(map(size_text, entries)))
+        if len(members) > 1:
+            row = [f"{len(entries)} others", ""]
+        bias = not any(entry.sigma for entry in entries)
+        alone = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
+        for (output, _), angle in zip(outputs, alone, strict=True):
+            cases = math.fsum(sampled.get(entry.name, {}).get(output, 0.0) for entry in entries)
+            linear = float(first.shares(output)[places].sum())
+            row.append(f"{math.degrees(angle):.3g}")
+            row += ["bias", ""] if bias else [_percent(linear), _percent(cases)]
+        rows.append(row)
+    interactions = ["interactions", ""]
+    for output, _ in outputs:
+        rest = 1.0 - math.fsum(fractions[output] for fractions in sampled.values())
+        varies = first.sigma(output) > ROUNDING
+        interactions += ["", "", _percent(rest if varies else 0.0)]
+    headings = [(Shared.INPUT, ""), ("one sigma\nor bias", "")]
+    for _, label in outputs:
+        headings += [(label, "deg"), (Shared.LINEAR, "%"), (Shared.CASES, "%")]
     columns = [
-        Column(
-            "",
-            Shared.INPUT,
-            "",
-            lambda row: row.name.replace(", ", ",\n"),
-            where="screen",
-            kind=TEXT,
-        ),
-        Column(
-            "", "one sigma\nor bias", "", lambda row: row.size.replace(", ", ",\n"), where="screen"
-        ),
+        Column("", heading, unit, itemgetter(place), where="screen", kind=REAL if place else TEXT)
+        for place, (heading, unit) in enumerate(headings)
     ]
-    for at, (output, label) in enumerate(outputs.items()):
-        columns.append(Column("", label, "deg", partial(effect, at), where="screen"))
-        columns.append(Column("", Shared.LINEAR, "%", partial(linear, output), where="screen"))
-        columns.append(Column("", Shared.CASES, "%", partial(seen, at, output), where="screen"))
-    table = DataTable(
-        "Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)]
-    )
+    table = DataTable("Tolerance budget", columns, [*rows, interactions])
     caption = (
         "Effect: of the input alone. Shares of the variance of the residual vector: "
         "linear by derivatives of the "

@@ -15,14 +15,16 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
+from nutdamp.flight.propagation import Residual
 from nutdamp.planning import notes
 from nutdamp.planning.decision import SAME_ANGLE
 from nutdamp.planning.plan import Plan
-from nutdamp.planning.tradeoff import Front, Point, numbered
+from nutdamp.planning.tradeoff import Front, Point, Trade, numbered
 from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.decisions import heading, plan_json
 from nutdamp.views.parts import derived_table, named, pulse_table, requested, summary
 from nutdamp.views.tables import (
@@ -32,7 +34,6 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
-    angle_of,
     file_columns,
     values_of,
 )
@@ -55,7 +56,17 @@ class TradeRow(NamedTuple):
     point: Point
 
     @property
-    def least(self) -> float | None:
+    def pulses(self) -> Schedule:
+        """Its schedule."""
+        return self.point.plan.pulses
+
+    @property
+    def residual(self) -> Residual:
+        """Residual of its flight."""
+        return self.point.plan.flight.residual
+
+    @property
+    def bound(self) -> float | None:
         """Lower bound of the cost for small angles."""
         return self.front.least(self.point)
 
@@ -70,77 +81,80 @@ def rows_of(fronts: Sequence[Front]) -> list[TradeRow]:
 
 
 def _table(rows: Sequence[TradeRow]) -> DataTable:
-    return DataTable("Schedules by their ends", tuple(_columns(rows)), rows)
-
-
-def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
-    """``full`` is the table of one front, ``brief`` that of all."""
+    """One row a point; ``full`` is the table of one front, ``brief`` that of all."""
     first = rows[0].number if rows else 1
     others = any(row.point.plan.scheme != OPTIMAL.name for row in rows)
     judged = any(row.point.verdict.met is not None for row in rows)
     flown = any(row.point.verdict.cases is not None for row in rows)
-    bounded = any(row.least is not None for row in rows)
-    yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
-    yield Column("", "H within", "deg", attrgetter("front.shift"),
-                 lambda shift: "any" if math.isinf(shift) else degrees(shift).removesuffix(" deg"),
-                 "brief")  # fmt: skip
-    yield from file_columns("csv", "shift_allowed_deg=front.shift")
-    yield Column(
-        "end_s",
-        Shared.END,
-        "s",
-        attrgetter("point.plan.pulses.end"),
-        lambda end: f"{end:.3f}",
-        "csv full brief",
-    )
-    yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
-    yield Column(
-        "", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded
-    )
-    yield Column(
-        "pulses",
-        Shared.PULSES,
-        "",
-        lambda row: len(row.point.plan.pulses),
-        where="csv full brief",
-        kind=WHOLE,
-    )
-    spent = (
-        "propellant_kg=point.plan.pulses.propellant",
-        "total_impulse_Nms=point.plan.pulses.total_impulse",
-    )
-    yield from file_columns("csv", *spent, "first_order_least=least")
-    yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
-    yield from file_columns("csv", "nutation_deg=point.plan.flight.residual.nutation")
-    shift = angle_of("point.plan.flight.residual.momentum_shift")
-    yield Column(
-        "momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief"
-    )
-    yield from file_columns("csv", "axis_error_deg=point.plan.flight.residual.axis_error")
-    yield Column("", f"vs point {first}", "%", _saved, where="full")
-    yield Column("", "vs first", "%", _saved, where="" if others else "brief")
-    scheme = "csv full brief" if others else "csv"
-    yield Column(
-        "scheme", Shared.SCHEME, "", attrgetter("point.plan.scheme"), where=scheme, kind=TEXT
-    )
-    yield Column("status", "", "", attrgetter("point.verdict.status.value"), where="csv", kind=TEXT)
-    yield from file_columns("csv", "share=point.verdict.cases.complying")
-    yield Column(
-        "meets_requirement", "", "", lambda row: row.point.verdict.met, where="csv", kind=YES_NO
-    )
-    yield Column(
-        "", "comply", "", attrgetter("point.verdict.cases"), share_text, "full brief" * flown
-    )
-    yield Column(
-        "",
-        Shared.VERDICT,
-        "",
-        attrgetter("point.verdict"),
-        lead,
-        "full brief" * judged,
-        kind=TEXT,
-        met=lambda row: row.point.verdict.met,
-    )
+    bounded = any(row.bound is not None for row in rows)
+    shown = "full brief"
+    everywhere = "csv full brief"
+
+    def within(shift: float) -> str:
+        return "any" if math.isinf(shift) else degrees(math.radians(shift)).removesuffix(" deg")
+
+    def count(row: TradeRow) -> int:
+        return len(row.pulses)
+
+    def met(row: TradeRow) -> bool | None:
+        return row.point.verdict.met
+
+    columns = [
+        Column.named("point=number", "point", "", where=everywhere, kind=WHOLE),
+        Column.named("shift_allowed_deg=front.shift", "H within", "deg", within, "csv brief"),
+        Column.named("end_s=pulses.end", Shared.END, "s", "{:.3f}".format, everywhere),
+        Column("", "cost", "", lambda row: row.spent(row.point.cost), where=shown),
+        Column(
+            "",
+            "small-angle bound",
+            "",
+            lambda row: row.spent(row.bound),
+            where="full" if bounded else "",
+        ),
+        Column("pulses", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        *file_columns(
+            "csv",
+            "propellant_kg=pulses.propellant",
+            "total_impulse_Nms=pulses.total_impulse",
+            "first_order_least=bound",
+        ),
+        Column.named("least_unit=point.unit", "", "", where="csv", kind=TEXT),
+        *file_columns("csv", "nutation_deg=residual.nutation"),
+        Column.named(
+            "momentum_shift_deg=residual.momentum_shift",
+            Part.SHIFT.label,
+            "deg",
+            small_angle,
+            everywhere,
+        ),
+        *file_columns("csv", "axis_error_deg=residual.axis_error"),
+        Column("", f"vs point {first}", "%", _saved, where="full"),
+        Column("", "vs first", "%", _saved, where="" if others else "brief"),
+        Column.named(
+            "scheme=point.plan.scheme",
+            Shared.SCHEME,
+            "",
+            where=everywhere if others else "csv",
+            kind=TEXT,
+        ),
+        Column.named("status=point.verdict.status.value", "", "", where="csv", kind=TEXT),
+        *file_columns("csv", "share=point.verdict.cases.complying"),
+        Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
+        Column(
+            "", "comply", "", attrgetter("point.verdict.cases"), share_text, shown if flown else ""
+        ),
+        Column(
+            "",
+            Shared.VERDICT,
+            "",
+            attrgetter("point.verdict"),
+            lead,
+            shown if judged else "",
+            kind=TEXT,
+            met=met,
+        ),
+    ]
+    return DataTable("Schedules by their ends", columns, rows)
 
 
 def _saved(row: TradeRow) -> str:
@@ -148,11 +162,31 @@ def _saved(row: TradeRow) -> str:
     return fixed(100.0 * (row.point.cost / row.front.points[0].cost - 1.0), 1)
 
 
-def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
-    """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all
-    fronts.
-    """
+def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
+    """The screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
+    spacecraft, fronts = traded.spacecraft, traded.fronts
     points = rows_of(fronts)
+    head = [named(spacecraft, f": finish time against cost; schedules: {len(points)}")]
+    good = [row for row in points if not fails(row.point)]
+    for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
+        row = min(
+            good or points,
+            key=lambda row: order((row.point.cost, row.pulses.end)),
+            default=None,
+        )
+        if row is not None:
+            end = f"ends at {row.pulses.end:.3f} s (point {row.number})"
+            head.append(Text.assemble((f"{name}: ", "bold"), f"{row.spent(row.point.cost)}, {end}"))
+    required = requested(spacecraft)
+    if not points:
+        head.append(Text("NO SCHEDULE", "bold red"))
+    elif required:
+        light = next((row.point.verdict.light for row in good), Light.RED)
+        words = coloured(f"{len(good)} of {len(points)} schedules may be flown", light)
+        head.append(Text.assemble(("Requirement ", "bold"), f"({required}) ", words))
+    if verbose:
+        derived = derived_table(spacecraft)
+        return Group(*head, Text(), derived, *front_parts(spacecraft, fronts))
     notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
@@ -161,42 +195,10 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     if len(rows) < len(points):
         notes.append(note("trade-points", shown=len(rows), count=len(points)))
     return summary(
-        [*_head(spacecraft, fronts)],
+        head,
         (lambda **_: _table(rows).screen("brief")) if points else None,
         [*notes, *_ends_off(fronts)],
         "--csv points.csv · --plot trade.png · --schedules FOLDER",
-    )
-
-
-def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
-    points = rows_of(fronts)
-    yield named(spacecraft, f": finish time against cost; schedules: {len(points)}")
-    if not points:
-        yield Text("NO SCHEDULE", "bold red")
-        return
-    good = [row for row in points if not fails(row.point)]
-    for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
-        row = min(
-            good or points, key=lambda row: order((row.point.cost, row.point.plan.pulses.end))
-        )
-        costs = (
-            f"{row.spent(row.point.cost)}, ends at {row.point.plan.pulses.end:.3f} s (point "
-            f"{row.number})"
-        )
-        yield Text.assemble((f"{name}: ", "bold"), costs)
-    if required := requested(spacecraft):
-        light = next((row.point.verdict.light for row in good), Light.RED)
-        words = f"{len(good)} of {len(points)} schedules may be flown"
-        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", coloured(words, light))
-
-
-def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
-    """All tables of ``trade``."""
-    return Group(
-        *_head(spacecraft, fronts),
-        Text(),
-        derived_table(spacecraft),
-        *front_parts(spacecraft, fronts),
     )
 
 
@@ -214,22 +216,18 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
             parts.append(
                 _table([row for row in rows_of(fronts) if row.front is front]).screen("full")
             )
-    priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
-              if row.least is not None and row.point.cost < row.least]  # fmt: skip
-    below = [note("trade-below-bound")] * any(
-        spent != least for spent, least in priced
-    )  # as the table writes both
+    priced = [(row.spent(row.point.cost), row.spent(row.bound)) for row in rows_of(fronts)
+              if row.bound is not None and row.point.cost < row.bound]  # fmt: skip
+    # As the table writes both.
+    differ = any(spent != bound for spent, bound in priced)
+    below = [note("trade-below-bound")] if differ else []
     for sentence in sentences((*below, *_ends_off(fronts))):
         parts += [Text(), Text(sentence, style="dim")]
     return parts
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
-    off = [
-        row.point.plan.flight.residual.axis_error
-        for row in rows_of(fronts)
-        if row.front.shift == 0.0
-    ]
+    off = [row.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield note("trade-ends-off")
 
@@ -240,7 +238,7 @@ def fails(point: Point) -> bool:
 
 
 def _without_optimal(front: Front) -> str:
-    return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
+    return f"no schedule of optimal: {front.why}" if front.points else f"none: {front.why}"
 
 
 def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[Note]:
@@ -277,16 +275,16 @@ def front_name(front: Front, *, pointing: bool) -> str:
 # --- files
 
 
-def trade_csv(fronts: Sequence[Front]) -> str:
+def trade_csv(traded: Trade) -> str:
     """One row a point; a shift allowed of any size is empty."""
-    return _table(rows_of(fronts)).csv()
+    return _table(rows_of(traded.fronts)).csv()
 
 
-def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any]:
+def trade_json(traded: Trade) -> dict[str, Any]:
     """All fronts with their plans, in the form of ``plan --json``."""
     entries = []
-    for front in fronts:
-        rows = [row for row in rows_of(fronts) if row.front is front]
+    for front in traded.fronts:
+        rows = [row for row in rows_of(traded.fronts) if row.front is front]
         points = [
             {
                 **values_of(row, "point=number", "horizon_s=point.horizon"),
@@ -299,7 +297,7 @@ def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any
             for row in rows
         ]
         entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
-    return {**heading(spacecraft), "fronts": entries}
+    return {**heading(traded.spacecraft), "fronts": entries}
 
 
 def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
@@ -326,7 +324,7 @@ def _better(
     better = []
     for row in rows_of(fronts):
         saved = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit)
-        end = row.point.plan.pulses.end
+        end = row.pulses.end
         cheaper = saved > SAME_COST and end <= until
         able = row.point.verdict.met and not fails(row.point)
         if able and (misses or cheaper or _sooner(row.point.plan, chosen, saved)):
@@ -351,11 +349,11 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
     if better is not None:
         row = better[2]
         shift = better[2].front.shift
-        bound = (
-            "--free-axis " if math.isinf(shift) else f'--shift "{degrees(shift)}" ' * (shift > 0.0)
-        )
+        aim = "--free-axis " if math.isinf(shift) else ""
+        if 0.0 < shift < math.inf:
+            aim = f'--shift "{degrees(shift)}" '
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
-        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {bound}{horizon}"
+        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {aim}{horizon}"
         shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
         if judged.met is False:
             yield note("trade-meets", point=row.number, command=command, **shown)
@@ -364,7 +362,7 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
     rows = [
         row
         for row in rows_of(fronts)
-        if row.point.plan.pulses.end <= chosen.pulses.end and not fails(row.point)
+        if row.pulses.end <= chosen.pulses.end and not fails(row.point)
     ]
     nearest = min(rows, key=lambda row: row.point.cost, default=None)
     if nearest is None:

@@ -6,7 +6,6 @@ All screens, pages, figures and files take these; no other module has a word for
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import Any
@@ -16,12 +15,23 @@ from rich.text import Text
 from nutdamp.common.numerics import MISSING, RPM
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import reasons
+from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Cases, Light, Line, Status, Verdict
+from nutdamp.schemes.catalogue import SCHEMES
 from nutdamp.spacecraft.model import required_share
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, values_of
-from nutdamp.views.text import degrees, duration, joined, mass, most, quantity, short_angle, text
+from nutdamp.views.text import (
+    degrees,
+    duration,
+    joined,
+    limit_text,
+    mass,
+    quantity,
+    short_angle,
+    text,
+)
 
 HEADLINES = {
     Status.FLY: "FLY",
@@ -52,8 +62,8 @@ FIGURES = 8  # of a value beside its limit, at most
 
 def lead(verdict: Verdict) -> str:
     """Words of the status; where nothing is required they say so."""
-    nothing = verdict.flies and not verdict.required
-    return HEADLINES[verdict.status] + ", nothing required" * nothing
+    words = HEADLINES[verdict.status]
+    return f"{words}, nothing required" if verdict.flies and not verdict.required else words
 
 
 def spent(schedule: Schedule) -> str:
@@ -78,9 +88,8 @@ def fired(schedule: Schedule) -> str:
     if schedule.blocks or not trains:
         count = f"pulses {len(schedule)}"
     else:
-        count = " and ".join(
-            [*(f"train of {number}" for number in trains), *[f"pulses {single}"] * bool(single)]
-        )
+        counts = [f"train of {number}" for number in trains]
+        count = " and ".join([*counts, f"pulses {single}"] if single else counts)
     blocks = f"blocks {len(schedule.blocks)}, " if schedule.blocks else ""
     return f"{blocks}{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
 
@@ -93,30 +102,25 @@ def headline(verdict: Verdict, compared: Comparison | None = None) -> tuple[str,
     pulses = verdict.schedule
     if verdict.status is Status.NO_PLAN:
         why = verdict.why if compared is None else joined(reasons(compared))
-        return words, f": {why}" * bool(why)
+        return words, f": {why}" if why else ""
     if verdict.idle:
         return words, f" needed: {idle(verdict)}"
-    ideal = " (ideal impulses)" * pulses.idealised
-    about = (
-        f" {verdict.scheme}{ideal}"
-        if words == HEADLINES[Status.FLY]
-        else f": {verdict.scheme}{ideal}"
-    )
+    colon = "" if words == HEADLINES[Status.FLY] else ":"
+    ideal = " (ideal impulses)" if pulses.idealised else ""
     date = verdict.spacecraft.utc(pulses.end)
-    return words, f"{about}: {fired(pulses)}" + ("" if date is None else f", {date[:10]}")
+    day = "" if date is None else f", {date[:10]}"
+    return words, f"{colon} {verdict.scheme}{ideal}: {fired(pulses)}{day}"
 
 
 def idle(verdict: Verdict) -> str:
     """Clause on a motion that needs no pulse."""
     spacecraft = verdict.spacecraft
-    there = f"nutation {degrees(spacecraft.nutation)} at t = 0"
+    motion = f"nutation {degrees(spacecraft.nutation)} at t = 0"
     if spacecraft.goal.axis is not None:
-        there += f", H {degrees(spacecraft.to_turn)} from the target"
-    return there + (
-        f", kept up to the horizon of {duration(spacecraft.horizon)}"
-        if spacecraft.growth > 0.0
-        else ""
-    )
+        motion += f", H {degrees(spacecraft.to_turn)} from the target"
+    if spacecraft.growth > 0.0:
+        motion += f", kept up to the horizon of {duration(spacecraft.horizon)}"
+    return motion
 
 
 def statement(verdict: Verdict) -> str:
@@ -179,7 +183,8 @@ def line_word(line: Line) -> str:
     """Verdict on one bound."""
     if line.bound.required:
         return MET[line.met]
-    return "NOT " * (not line.met) + DAMPED.get(line.bound.part, "damped")
+    word = DAMPED.get(line.bound.part, "damped")
+    return word if line.met else f"NOT {word}"
 
 
 def share_text(cases: Cases | None) -> str:
@@ -222,8 +227,8 @@ def coloured(words: str, light: Light) -> Text:
 
 def limit(bound: Bound) -> str:
     """The limit of a bound with its sign and unit."""
-    size = f"{RPM * bound.limit:.4g} rpm" if bound.part is Part.SPIN else most(bound.limit)
-    return f"{'≥' if bound.inner else '≤'} {size}"
+    size = f"{RPM * bound.limit:.4g} rpm" if bound.part is Part.SPIN else limit_text(bound.limit)
+    return f"≥ {size}" if bound.inner else f"≤ {size}"
 
 
 def value(bound: Bound, number: float | None) -> str:
@@ -259,44 +264,47 @@ def margin(line: Line) -> str:
     return f"{short_angle(line.margin, line.bound.limit)} deg"
 
 
-def bound_table(
-    verdict: Verdict, lines: Sequence[Line] | None = None, title: str = "Requirement"
-) -> DataTable:
+def bound_table(verdict: Verdict) -> DataTable:
     """One row a bound: limit, nominal value, that in the share of cases required, cases that keep
     it alone, margin.
     """
     cases = verdict.cases
-    level = Shared.NOMINAL if cases is None else f"{exact_percent(cases.probability)} within"
-    dispersed = "page screen" * (cases is not None)
-    everywhere = "page screen"
-
-    def alone(line: Line) -> str:
-        return (
-            MISSING
-            if line.share is None or cases is None
-            else percent(line.share, cases.probability)
-        )
-
-    columns = (
-        Column("", "requirement", "", lambda line: line.bound.label, where=everywhere, kind=TEXT),
-        Column("", "limit", "", lambda line: limit(line.bound), where=everywhere),
-        Column(
-            "", Shared.NOMINAL, "", lambda line: value(line.bound, line.nominal), where=everywhere
-        ),
-        Column("", level, "", lambda line: value(line.bound, line.dispersed), where=dispersed),
-        Column("", "keep it", "", alone, where=dispersed),
-        Column("", "margin", "", margin, where=everywhere),
-        Column("", "", "", line_word, where=everywhere, kind=TEXT, met=lambda line: line.met),
-    )
-    return DataTable(title, columns, verdict.lines if lines is None else lines)
+    where = "page screen"
+    columns = [
+        Column("", "requirement", "", attrgetter("bound.label"), where=where, kind=TEXT),
+        Column("", "limit", "", lambda line: limit(line.bound), where=where),
+        Column("", Shared.NOMINAL, "", lambda line: value(line.bound, line.nominal), where=where),
+    ]
+    if cases is not None:
+        share = cases.probability
+        level = f"{exact_percent(share)} within"
+        columns += [
+            Column("", level, "", lambda line: value(line.bound, line.dispersed), where=where),
+            Column(
+                "", "keep it", "", attrgetter("share"), lambda alone: percent(alone, share), where
+            ),
+        ]
+    columns += [
+        Column("", "margin", "", margin, where=where),
+        Column("", "", "", line_word, where=where, kind=TEXT, met=attrgetter("met")),
+    ]
+    return DataTable("Requirement", columns, verdict.lines)
 
 
-def scheme_word(compared: Comparison, plan: Any) -> str:
-    """Verdict on one of the plans compared, or in short why it is not recommended."""
-    verdict = compared.verdicts[plan]
+def scheme_word(compared: Comparison, plan: Plan) -> str:
+    """Verdict on one of the plans compared, or in short why it is not recommended, or why there is
+    none.
+    """
+    if plan.failure is not None:
+        return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
+    if not plan.feasible:
+        if SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels:
+            return "no thrusters"
+        return "not found" if plan.found_none else "infeasible"
     why = compared.shortcoming(plan)
     if why is not None:
         return text(why)
+    verdict = compared.verdicts[plan]
     if verdict.required:
         return MET[True]
     return ", ".join(line_word(line) for line in verdict.lines)

@@ -107,10 +107,16 @@ def traded_point(later: float, share: float) -> tradeoff.Point:
     return tradeoff.Point(replace(made, scheme="optimal", schedule=schedule), 40.0, "N m s")
 
 
+def trade_figure(
+    body: Spacecraft, fronts: tuple[tradeoff.Front, ...], chosen: planning.Plan | None = None
+) -> Figure:
+    return studies.trade_figure(tradeoff.Trade(body, fronts, chosen))
+
+
 @pytest.mark.deep
 def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     chosen = planning.plan(BODY, "two-pulse")
-    figure = studies.trade_figure(BODY, traded(), chosen)
+    figure = trade_figure(BODY, traded(), chosen)
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
@@ -133,14 +139,14 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
 @pytest.mark.parametrize("front", [0, 1])
 def test_no_number_lies_under_the_mark_of_the_recommended_plan(front: int) -> None:
     for point in traded()[front].points:
-        (axes,) = studies.trade_figure(BODY, traded(), point.plan).axes
+        (axes,) = trade_figure(BODY, traded(), point.plan).axes
         assert axes.xaxis.get_major_formatter()(2.0) == "2"  # no powers of ten
         check_star(axes, np.array([point.plan.end, point.cost]), 0.36 * 11.0)
 
 
 @pytest.mark.deep
 def test_fronts_without_points_say_why() -> None:
-    figure = studies.trade_figure(spinner(), (tradeoff.Front(0.0, (), "no channel"),))
+    figure = trade_figure(spinner(), (tradeoff.Front(0.0, (), "no channel"),))
     check_layout(figure)
     assert not figure.axes
     assert any(
@@ -150,13 +156,11 @@ def test_fronts_without_points_say_why() -> None:
     missing = tradeoff.Front(
         0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5
     )
-    figure = studies.trade_figure(BODY, (missing, traded()[1]))
+    figure = trade_figure(BODY, (missing, traded()[1]))
     check_layout(figure)
     said = " ".join(figure.axes[0].get_title(loc="left").split())
     assert said.startswith("H ends where it was \N{EN DASH} none: within 40 s H cannot be kept")
-    assert not any(
-        "none" in text.get_text() for text, _ in texts(studies.trade_figure(BODY, traded()))
-    )
+    assert not any("none" in text.get_text() for text, _ in texts(trade_figure(BODY, traded())))
 
 
 @pytest.mark.weekly
@@ -172,7 +176,7 @@ def test_points_that_miss_the_requirement_are_crossed_out_and_all_have_a_place(
     failing = {
         (point.plan.end, point.cost) for point in plans if point.plan.meets_requirement is False
     }
-    figure = studies.trade_figure(body, both)
+    figure = trade_figure(body, both)
     check_layout(figure)
     low, high = figure.axes[0].get_xlim()
     assert all(low < point.plan.pulses.end < high for point in plans)
@@ -192,7 +196,7 @@ def test_of_points_close_together_those_are_numbered_that_have_room(
     close = tradeoff.Front(
         0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count))
     )
-    figure = studies.trade_figure(BODY, (close,))
+    figure = trade_figure(BODY, (close,))
     check_layout(figure)
     (axes,) = figure.axes
     labels = [one for one in axes.texts if isinstance(one, Annotation)]

@@ -256,7 +256,7 @@ def test_every_command_on_a_page_runs(run: Run, tmp_path: Path, craft: str) -> N
 
 # --- explain: every topic prints what it is for, at any width, and loads nothing heavy
 
-FIGURES = guide.found("figures")
+FIGURES = guide.topic_of("figures")
 TOPICS = (
     *guide.NAMES,
     *(equation.number for equation in guide.EQUATIONS),
@@ -353,9 +353,10 @@ def test_numbers_and_figures_as_people_write_them() -> None:
         "24.4": "24.4",
         "§24.4": "24.4",
     }
-    assert {requested: guide.found(requested).name for requested in written} == written
+    assert {requested: guide.topic_of(requested).name for requested in written} == written
     assert all(
-        guide.found(name) is FIGURES for name in ("Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES")
+        guide.topic_of(name) is FIGURES
+        for name in ("Abb. 5", "abb8", "fig. 6", "Figures", "FIGURES")
     )
 
 
@@ -441,15 +442,17 @@ def test_the_figures_are_all_there_and_their_commands_differ_in_the_motion_alone
 
 
 VIEWS = places.ROOT / "nutdamp" / "views"
+COLUMNS = ("Column", "Column.named")  # calls that declare a column, with its name in files first
 
 
 def declared(package: str) -> Iterator[str]:
     """Headings of tables in the code: Column(…), Heading(…), columns(…) and lists of heads."""
     for node in nodes((places.ROOT / "nutdamp" / package).glob("*.py")):
         parts: list[ast.expr] = []
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            shown = {"columns": slice(0, None), "Heading": slice(0, 1), "Column": slice(1, 2)}
-            parts = node.args[shown.get(node.func.id, slice(0))]
+        if isinstance(node, ast.Call):
+            shown = {"columns": slice(0, None), "Heading": slice(0, 1)}
+            shown |= dict.fromkeys(COLUMNS, slice(1, 2))
+            parts = node.args[shown.get(ast.unparse(node.func), slice(0))]
         elif isinstance(node, ast.Assign | ast.AugAssign):
             target = node.targets[0] if isinstance(node, ast.Assign) else node.target
             parts = [node.value] * (isinstance(target, ast.Name) and target.id == "heads")
@@ -540,11 +543,7 @@ def columns_written() -> Iterator[str]:
 def keys_of_columns() -> Iterator[tuple[str, str]]:
     """Names of columns that go into files, and the places that have them, where written out."""
     for node in nodes(VIEWS.glob("*.py")):
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id == "Column"
-        ):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in COLUMNS:
             key, *others = node.args
             texts = [
                 text
@@ -552,7 +551,7 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
                 for text in texts_in(other)
             ]
             if isinstance(key, ast.Constant) and key.value:
-                yield str(key.value), " ".join(texts)
+                yield str(key.value).partition("=")[0], " ".join(texts)
         for name in keys_named(node, "file_columns"):
             assert isinstance(node, ast.Call)
             yield name, " ".join(texts_in(node.args[0]))

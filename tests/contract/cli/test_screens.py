@@ -27,10 +27,10 @@ from nutdamp.cli.studies import stoppable
 from nutdamp.common import work
 from nutdamp.files.reader import example_text
 from nutdamp.planning import plan as planning
-from nutdamp.planning.tradeoff import Front, Point
+from nutdamp.planning.tradeoff import Front, Point, Trade
 from nutdamp.spacecraft.model import Requirement
 from nutdamp.views.tables import NARROW, columns
-from nutdamp.views.trade import ROWS, trade_brief, trade_screen
+from nutdamp.views.trade import ROWS, trade_screen
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -326,26 +326,20 @@ def test_the_default_screen_of_every_shipped_file_fits_a_terminal(run: Run, comm
 def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> None:
     body = replace(spinner(channels=cross(8.0)), requirement=Requirement(nutation=0.01))
     plan = planning.plan(body, "two-pulse")
-    fronts = [Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 20) for at in range(5)]
-    shown = "\n".join(printed(trade_brief(body, fronts), WIDTH))
+    fronts = (Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 20) for at in range(5))
+    traded = Trade(body, tuple(fronts))
+    shown = "\n".join(printed(trade_screen(traded, verbose=False), WIDTH))
     check_screen(shown)
     rows = re.findall(r"^(\d+) .*FLY$", shown, re.MULTILINE)
     assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
     assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
-    assert (
-        len(
-            [
-                line
-                for line in printed(trade_screen(body, fronts), WIDTH)
-                if re.match(r"\d+ .*FLY$", line)
-            ]
-        )
-        == 100
-    )
+    every = printed(trade_screen(traded, verbose=True), WIDTH)
+    assert sum(bool(re.match(r"\d+ .*FLY$", line)) for line in every) == 100
 
 
 def test_a_trade_without_a_schedule_says_why() -> None:
-    shown = "\n".join(printed(trade_brief(spinner(), [Front(0.0, (), "no channel")]), WIDTH))
+    fronts = (Front(0.0, (), "no channel"),)
+    shown = "\n".join(printed(trade_screen(Trade(spinner(), fronts), verbose=False), WIDTH))
     assert "NO SCHEDULE" in shown
     assert "H ends where it was – none: no channel" in shown
 

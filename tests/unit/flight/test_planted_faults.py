@@ -4,6 +4,7 @@ since it flies by the file alone.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import pytest
@@ -64,7 +65,8 @@ def valve(changed: Callable[[Trapezoid], Trapezoid], late: float = 0.0) -> Plant
 
 
 def scaled(owner: type, name: str, factor: float) -> Plant:
-    usual = vars(owner)[name].fget
+    kept = vars(owner)[name]
+    usual = kept.func if isinstance(kept, cached_property) else kept.fget
     return lambda patch: patch.setattr(owner, name, property(lambda self: factor * usual(self)))
 
 

@@ -95,6 +95,18 @@ def test_json_has_vectors_as_lists_and_unknown_values_null() -> None:
     assert second == {"name": "two", "count": 2, "axis_m": None, "size_m": None, "good": None}
 
 
+def test_a_column_has_key_and_value_by_its_name_and_words_of_a_row() -> None:
+    rows = [Row(axis=Row(turn=math.pi / 6)), Row(axis=None)]
+    column = Column.named("turn_deg=axis.turn", "turn", "deg", "{:.1f}".format, "json")
+    assert DataTable("", [column], rows).json() == [
+        {"turn_deg": pytest.approx(30.0)},
+        {"turn_deg": None},
+    ]
+    assert [*map(column.worded, rows)] == ["30.0 deg", "–"]
+    told = column._replace(words=lambda row: "free" if row.axis is None else None)
+    assert [*map(told.shown, rows)] == ["–", "free"]
+
+
 def test_an_array_has_the_fields_of_the_file() -> None:
     array = TABLE.array()
     assert array.dtype.names == (
