@@ -307,6 +307,7 @@ def _third_axis(quaternion: Array) -> Array:
     return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
+HALF = 1.01 * math.pi  # rad: a Sun pulse farther off than half a turn is lost
 ITERATIONS = 40  # largest number of Newton steps to a Sun pulse; three or four are usual
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 # largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
@@ -330,7 +331,8 @@ class SunPulseClock:
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3
     from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last computed Sun
     pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go round. ``over``
-    (n,) s: end of the last pulse, command and thrust.
+    (n,) s: end of the last pulse, command and thrust. ``looked_back`` counts steps to Sun pulses
+    under thrust.
     """
 
     def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
@@ -342,6 +344,7 @@ class SunPulseClock:
         self._number = 0
         self.time = start.since + (ahead - CIRCLE) / self._pace
         self.lost = np.zeros(len(start.since), dtype=bool)
+        self._moves = self.looked_back = 0
 
     @property
     def here(self) -> MotionStretch:
@@ -439,8 +442,10 @@ class SunPulseClock:
             cases = np.flatnonzero((sun_pulse.since < over.since) & ~self.lost)
             if not len(cases):
                 return
+            before = self._moves
             start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
             again = self._root(start, pace[cases], self.sun[:, cases])
+            self.looked_back += self._moves - before
             for whole, part in zip(sun_pulse[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
@@ -459,7 +464,7 @@ class SunPulseClock:
         pending = np.ones(count, dtype=bool) if wanted is None else wanted.copy()
         # A pulse more than half a turn off is lost. Under thrust Newton's steps may go on for
         # hundreds of radians: a plan of blocks took 75 s so, and 15 s within a turn.
-        earliest, latest = start.since - CIRCLE / pace, start.since + CIRCLE / pace
+        earliest, latest = start.since - HALF / pace, start.since + HALF / pace
         for _ in range(ITERATIONS):
             rows = np.flatnonzero(pending)
             if not len(rows):
@@ -473,6 +478,7 @@ class SunPulseClock:
             # mean rate.
             time = some.since + off / np.where(rate > 0.1 * pace[rows], rate, pace[rows])
             moved = some.moved(np.clip(time, earliest[rows], latest[rows]))
+            self._moves += 1
             pending[rows] &= (np.abs(off) >= CIRCLE * EXACT) & (moved.since != some.since)
             if few:
                 for whole, part in zip(here[1:4], moved[1:4], strict=True):

@@ -43,6 +43,11 @@ BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waite
 ALWAYS = 500  # Sun pulses that flights of blocks may take whatever work is spent
 NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
+LOOKED_BACK = 2.0
+"""Units of `work` of a step of Newton's method to a Sun pulse under thrust: the plan of a steerable
+stage that is pushed for a turn and more took 5 s of which nothing was charged.
+"""
+
 FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 6.0
 """Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
 of a turn of theirs that is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
@@ -248,11 +253,14 @@ def fire_all(
     arcs = spacecraft.inertia.symmetric and not spacecraft.disturbances
     per_kg = shed(spacecraft)
     over, passed = np.zeros(count), np.zeros(count)
+    looked_back = 0
     turn = spin_turn(spacecraft)
     for motion, flights in sun_pulses:
         turns = 1.0 if arcs else float(np.max(motion.since - passed)) / turn
         passed = motion.since
-        work.spend((STEPPED if arcs else INTEGRATED * turns) + FIRED * len(flights))
+        back = LOOKED_BACK * (clock.looked_back - looked_back)
+        looked_back = clock.looked_back
+        work.spend((STEPPED if arcs else INTEGRATED * turns) + FIRED * len(flights) + back)
         delays = motion.since * 0.0
         widths = np.zeros(count)
         given = dict[int, Pulse]()

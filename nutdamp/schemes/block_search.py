@@ -383,6 +383,10 @@ class BlockSearch:
                 pair, rest = np.nonzero(use & np.isfinite(table))
             else:
                 rest = least(table, 2 if last or delays is None else table.shape[1])
+                # Of those that comply alike the first to end, too.
+                ends = np.broadcast_to(after.sun_pulse, shape).reshape(len(rows), -1)
+                first = np.where(complies(table), ends, np.inf).argmin(axis=1)
+                rest = np.concatenate([rest, first[:, None]], axis=1)
                 pair = np.repeat(np.arange(len(rows)), rest.size // len(rows))
                 rest = rest.ravel()
                 finite = np.isfinite(table[pair, rest])
