@@ -253,8 +253,7 @@ def _cone(model: Model, share: float) -> _Cone | None:
     momentum = momentum * math.copysign(1.0, float(momentum @ mean))
     if np.linalg.norm(mean) > NARROW:
         momentum = mean / np.linalg.norm(mean)
-    first = np.cross(np.eye(3)[np.argmin(np.abs(momentum))], momentum)
-    first /= np.linalg.norm(first)
+    first = attitude.square_to(momentum)
     second = np.cross(momentum, first)
     x, y = axis @ first, axis @ second
     # In the sense of H, with |H|/A = H3/(A cos θ).

@@ -12,7 +12,7 @@ from nutdamp.figures import geometry, style
 from nutdamp.figures.geometry import DrawnCones
 from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.flight.propagation import Flight, Track
-from nutdamp.physics.attitude import angle_between
+from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Keep, Vector
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def directed(flight: Flight) -> list[tuple[Keep, Vector]]:
 
 def has_globe(flight: Flight, track: Track) -> bool:
     """True where there is a direction to be shown, and the spin axis moves by more than `MOVES`."""
-    moved = float(angle_between(track.axis, track.axis[0]).max())
+    moved = float(attitude.angle_between(track.axis, track.axis[0]).max())
     return moved > MOVES and bool(len(geometry.aimed(flight)) or directed(flight))
 
 
@@ -148,8 +148,7 @@ def _draw_keep(
     (place,), (height,) = looked.seen(direction)
     axes.plot(*place, "o", color=INK, markersize=6, markerfacecolor="none", zorder=4)
     yield (f"{cone.name} (behind)" if height < 0.0 else cone.name), place
-    square = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    square /= np.linalg.norm(square)
+    square = attitude.square_to(direction)
     bounds = [("≥", cone.least, cone.least > 0.0), ("≤", cone.most, cone.most < math.pi)]
     for sign, angle, bounded in bounds:
         if not bounded:
