@@ -109,6 +109,9 @@ LARGEST = 1e15
 and results of larger values could overflow.
 """
 
+FASTEST = 100.0
+"""rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm."""
+
 LARGEST_SEED = 2**64 - 1
 """Largest seed of random numbers."""
 
@@ -253,6 +256,15 @@ def screen_unit(unit: str, scale: float = 1.0) -> tuple[str, float]:
     }
     customary = _US_UNITS[replaced[0]]
     return customary + unit[replaced.end() :], scale * factors[replaced[0]] / factors[customary]
+
+
+def reading(value: float, kind: str, meant: str) -> str:
+    """The reading of a bare number, and the text to write where ``meant`` is its likelier unit."""
+    number = f"{value:.12g}"
+    si = KINDS[kind].si
+    unit = f"rad ({math.degrees(value):.4g} deg)" if kind == "angle" else si
+    cure = f"write {number} {meant} if that is meant, else {number} {si}"
+    return f"{number} is read as {number} {unit}; {cure}"
 
 
 def bar(pressure: float) -> str:

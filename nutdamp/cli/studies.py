@@ -44,13 +44,12 @@ from nutdamp.cli.options import (
     UnitType,
     expect_read,
     goal_options,
-    reading_of,
 )
 from nutdamp.cli.plan import compared_with, scheme_option
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import CannotWrite, Infeasible, printable
 from nutdamp.schemes.catalogue import LEAST, NAMES, OPTIMAL, SchemeOptions
-from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
+from nutdamp.units import LARGEST_SEED, reading, shifts, thresholds, tilt
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -315,7 +314,7 @@ def trade_command(
     allowed = allow or (0.0, math.inf)
     for shift in allow:
         if isinstance(shift, Bare) and shift:
-            job.doubt(f"--allow: {reading_of(shift, 'angle', 'deg')}")
+            job.doubt(f"--allow: {reading(shift, 'angle', 'deg')}")
     job.begin([] if schedules is None else schedule_paths(schedules, points * len({*allowed})))
     expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.doubt)
     traded = fronts_of(job, points, allowed, least)
@@ -433,8 +432,8 @@ def budget_command(
     `nutdamp plan`.
     """
     spacecraft = job.begin()
-    for reading in (text for pair in pairs for text in pair.readings):
-        job.doubt(f"--thresholds: {reading}")
+    for text in (text for pair in pairs for text in pair.readings):
+        job.doubt(f"--thresholds: {text}")
 
     from nutdamp.api import budget
 
