@@ -16,7 +16,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.main import QUIET, UNITS, look_of_screen, say, show, working
+from nutdamp.cli.main import QUIET, UNITS, in_context, look_of_screen, say, show, working
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -53,17 +53,12 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion")  # pictures that ``--plot`` can draw, the default first
 
 
-def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
-    ctx.meta[UNITS] = value
-
-
-def _quiet(ctx: click.Context, _: click.Parameter, value: bool) -> bool:
-    ctx.meta[QUIET] = value
-    return value
-
-
 quiet_option = click.option(
-    "-q", "--quiet", is_flag=True, callback=_quiet, help="Hide progress, notes and next steps."
+    "-q",
+    "--quiet",
+    is_flag=True,
+    callback=in_context(QUIET),
+    help="Hide progress, notes and next steps.",
 )
 
 
@@ -74,7 +69,7 @@ def screen_options(command: Command) -> Command:
         type=NameType((SI, US)),
         default=SI,
         expose_value=False,
-        callback=_units,
+        callback=in_context(UNITS),
         help="Units of the screen, default si; files are SI.",
     )
     verbose = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
