@@ -552,9 +552,13 @@ def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
 def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the spacecraft file, for editors."""
     parts: dict[str, Any] = {}
-    whole = {**section_schema(keys.SpacecraftFile, parts), "title": "nutdamp spacecraft file"}
-    schema = {"$defs": dict(sorted(parts.items())), **whole}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_in_order(schema)}
+    schema = section_schema(keys.SpacecraftFile, parts)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "nutdamp spacecraft file",
+        "$defs": parts,
+    }
 
 
 def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, Any]:
@@ -610,13 +614,3 @@ def _ruled_schema(
     if not rules:
         return _schema(annotation, parts)
     return rules[-1].schema(lambda: _ruled_schema(annotation, rules[:-1], parts))
-
-
-def _in_order(schema: Any, within: str = "") -> Any:
-    """Keywords in the order of the alphabet, properties in that of the section."""
-    if isinstance(schema, dict):
-        names = schema if within in ("properties", "default") else sorted(schema)
-        return {
-            name: _in_order(schema[name], name if within != "properties" else "") for name in names
-        }
-    return [_in_order(entry, within) for entry in schema] if isinstance(schema, list) else schema
