@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime
 import math
-import shutil
 from collections.abc import Callable, Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
@@ -20,12 +19,12 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
-from nutdamp.files.tabular import STDOUT, csv_text, whole_file
+from nutdamp.files.tabular import csv_text, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
-from nutdamp.montecarlo.statistics import OUTPUTS, Array
+from nutdamp.montecarlo.statistics import Array
 from nutdamp.montecarlo.study import Study
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -248,8 +247,6 @@ OUTPUT_COLUMNS = (
 )
 """Columns of `OUTPUTS`, in their order."""
 
-SHORTEST = 12  # bytes that a number takes at least, on average, with its comma
-
 
 def cone_columns(spacecraft: Spacecraft) -> list[str]:
     """Headings of the least and the largest angle to the direction of each cone."""
@@ -298,24 +295,6 @@ class SamplesWriter:
 def _texts(values: Array) -> list[str]:
     """Numbers that read back as they were; NaN is empty."""
     return [""] * len(values) if math.isnan(values[0]) else list(map(repr, values.tolist()))
-
-
-def check_room(path: str, study: Study, samples: int) -> None:
-    """Raise CannotWrite where a disk cannot hold so many rows."""
-    if path == STDOUT or (Path(path).exists() and not Path(path).is_file()):
-        return
-    needed = (
-        samples
-        * SHORTEST
-        * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))
-    )
-    try:
-        free = shutil.disk_usage(Path(path).resolve().parent).free
-    except OSError:
-        return  # the folder cannot be looked at: writing will say why
-    if needed > free:
-        room = f"{needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free there"
-        raise CannotWrite(path, f"{samples} rows take more than {room}")
 
 
 class FlownCases(Protocol):
