@@ -110,9 +110,11 @@ class Angles(NamedTuple):
     @property
     def readings(self) -> tuple[str, ...]:
         """Readings of unitless numbers that are likely degrees: whole, and more than a turn."""
-        bare = [angle for angle in self if isinstance(angle, Bare)]
         doubtful = [
-            angle for angle in bare if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
+            angle
+            for angle in self
+            if isinstance(angle, Bare)
+            if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
         ]
         return tuple(units.reading(angle, "angle", "deg") for angle in doubtful)
 

@@ -317,35 +317,35 @@ def streamed(
     Returns what ``fly`` does, and the error if they are not all saved. Raises CannotWrite where no
     case has flown yet, KeyboardInterrupt where the flight ended before the first.
     """
-    results: list[Flown] = []
 
-    def fly_some(collect: Callable[..., None] | None) -> Flown:
-        results.append(fly(collect))
-        if not results[0].done:
+    def flown(collect: Callable[..., None] | None) -> Flown:
+        results = fly(collect)
+        if not results.done:
             raise KeyboardInterrupt  # so that no file is written
-        return results[0]
+        return results
 
     if path is None:
-        return fly_some(None), None
+        return flown(None), None
+    results: Flown | None = None
     full: list[OSError] = []
+
+    def collect(*part: Any) -> None:
+        try:
+            if not full:
+                rows.write(*part)
+        except BrokenPipeError:
+            raise
+        except OSError as reason:
+            full.append(reason)
+
     try:
         with whole_file(fspath(path)) as stream:
             rows = writer(stream, study)
-
-            def collect(*part: Any) -> None:
-                try:
-                    if not full:
-                        rows.write(*part)
-                except OSError as reason:
-                    if isinstance(reason, BrokenPipeError):
-                        raise
-                    full.append(reason)
-
-            fly_some(collect)
+            results = flown(collect)
             if full:
                 raise full[0]
     except CannotWrite as wrong:
-        if not results:
+        if results is None:
             raise
-        return results[0], wrong
-    return results[0], None
+        return results, wrong
+    return results, None

@@ -36,7 +36,7 @@ from nutdamp.files import keys
 from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.keys import LoopSection, by_name, dispersions, thrust_behind
-from nutdamp.files.rules import correlation_findings, disturbance_kind, doubts, findings
+from nutdamp.files.rules import correlation_findings, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
@@ -442,11 +442,10 @@ def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) 
         torque = inertia.axes.T @ torque
         torque[np.abs(torque) <= CANCELLED * math.hypot(*torque)] = 0.0
     rate = 0.0
-    if (
-        disturbance_kind(entry.kind, entry.rate is not None or entry.fixed_in is not None)
-        == "rotating"
-    ):
-        rate = -spin if entry.rate is None else entry.rate
+    if entry.rate is not None:
+        rate = entry.rate
+    elif entry.kind == "rotating" or entry.fixed_in is not None:
+        rate = -spin
     return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 

@@ -206,7 +206,7 @@ def _needs(facts: Facts, path: KeyPath, others: str, why: str) -> Iterator[Findi
 def _missing(facts: Facts, path: KeyPath, others: str, cure: str) -> Iterator[Finding]:
     """A key that must be there unless one of the others is."""
     present = facts.has(*path) or any(_holds(facts, path, other) for other in others.split())
-    if not present and facts.is_mapping(*path[:-1]):
+    if not present and isinstance(facts.value(*path[:-1]), dict):
         yield Finding(path, f"missing; {cure}")
 
 
@@ -397,11 +397,6 @@ def _motion(facts: Facts) -> Iterator[Finding]:
     if facts.has("dissipation") and not facts.has("dissipation", "nutation"):
         problem = "missing; with a wheel the place of the loss decides: give grows or decays"
         yield Finding(("dissipation", "nutation"), problem)
-
-
-def disturbance_kind(kind: str | None, turns: bool) -> str:
-    """Kind of a disturbance that says ``kind`` or nothing; ``turns``: rate or fixed_in is given."""
-    return kind or ("rotating" if turns else "constant")
 
 
 def _disturbances(facts: Facts) -> Iterator[Finding]:
