@@ -360,7 +360,10 @@ class Job:
 
 
 def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
-    """The job of a command line; the ``parameters`` that belong to it are taken from them."""
+    """The job of a command line; the ``parameters`` that belong to it are taken from them.
+
+    A usage error where several name the pulses to fly.
+    """
     types = {each.name: each.type for each in command.params if each.name in parameters}
     spacecraft = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
     written = {
@@ -377,6 +380,9 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
         path for paths in inputs for path in (paths if isinstance(paths, tuple) else (paths,))
     )
     flown = FlownChoice(*(parameters.pop(name, None) for name in FlownChoice._fields))
+    if flown.count(None) < len(flown) - 1:
+        problem = "name one of --scheme, --schedule and --blocks"
+        raise click.UsageError(problem, click.get_current_context())
     options = options_in(command, parameters)
     aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
     usual = next((str(each.default) for each in command.params if each.name == "figure"), None)

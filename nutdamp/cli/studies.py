@@ -64,24 +64,12 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
     """``--scheme`` (its help may differ), ``--schedule`` and ``--blocks``: one alone."""
     default = f"{verb} this scheme with default options; without it the recommended one."
 
-    def alone(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-        named = [
-            name
-            for name in ("scheme", "schedule", "blocks")
-            if name != param.name and ctx.params.get(name)
-        ]
-        if value is not None and named:
-            raise click.UsageError(
-                f"name what to {verb.lower()}: one of --scheme, --schedule and --blocks"
-            )
-        return value
-
     def decorate(command: Command) -> Command:
         read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
         fired = f"{verb} what the command blocks of a CSV file fire, as `plan --blocks` writes it."
-        command = click.option("--blocks", type=FILE, callback=alone, help=fired)(command)
-        command = click.option("--schedule", type=FILE, callback=alone, help=read)(command)
-        return scheme_option(type=NameType(NAMES), callback=alone, help=scheme or default)(command)
+        command = click.option("--blocks", type=FILE, help=fired)(command)
+        command = click.option("--schedule", type=FILE, help=read)(command)
+        return scheme_option(type=NameType(NAMES), help=scheme or default)(command)
 
     return decorate
 
