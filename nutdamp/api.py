@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, Infeasible, nearest, warn
+from nutdamp.errors import BadRequest, Infeasible, cure_of, warn
 from nutdamp.schemes.catalogue import (
     LEAST,
     NAMES,
@@ -147,9 +147,7 @@ def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
     names = tuple(values)
     for name in names:
         if not isinstance(name, str) or name not in NAMES:
-            close = nearest(name, NAMES) if isinstance(name, str) else None
-            cure = f"there are {', '.join(NAMES)}" if close is None else f"did you mean {close!r}?"
-            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure}")
+            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure_of(name, NAMES)}")
     return tuple(dict.fromkeys(names))
 
 

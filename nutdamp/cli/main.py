@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from nutdamp import __version__
-from nutdamp.errors import Infeasible, nearest, printable
+from nutdamp.errors import Infeasible, cure_of, printable
 from nutdamp.units import SI, screen_units
 
 if TYPE_CHECKING:
@@ -347,9 +347,8 @@ class _CommandGroup(click.Group):
         """The command that is named; a usage error suggests the nearest name."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
-            close = nearest(name, COMMANDS)
             ctx.fail(
-                f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else "")
+                f"there is no command {name!r}; {cure_of(name, COMMANDS, '`nutdamp -h` lists them')}"
             )
         return super().resolve_command(ctx, args)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.errors import nearest, span
+from nutdamp.errors import cure_of, span
 from nutdamp.files.facts import (
     CANCELLED,
     Facts,
@@ -275,19 +275,8 @@ def _named(facts: Facts, path: KeyPath, what: str, _: str) -> Iterator[Finding]:
     """The name of a thruster or channel of the file."""
     name = facts.text(*path)
     if name is not None and name not in facts.names[what]:
-        yield Finding(path, _unknown(name, what, [*facts.names[what]]))
-
-
-def _unknown(name: str, what: str, names: list[str]) -> str:
-    """The problem of a name that is none, with the one that was meant, or those that there are."""
-    few = names[:20]  # to look for the nearest of very many takes long
-    close = nearest(name, few)
-    cure = f"there are {', '.join(map(shown, few))}" if names else "the file has none"
-    if len(names) > len(few):
-        cure = f"{cure} …"
-    if close is not None:
-        cure = f"did you mean {shown(close)}?"
-    return f"no {what} is called {shown(name)}; {cure}"
+        cure = cure_of(name, facts.names[what])
+        yield Finding(path, f"no {what} is called {shown(name)}; {cure}")
 
 
 OTHER_SENSOR = {
@@ -470,7 +459,8 @@ def _dispersions(facts: Facts) -> Iterator[Finding]:
             places = {str(entry[-1]): entry for entry in facts.below(*path)}
         for name, place in places.items():
             if name not in facts.thrusts:
-                yield Finding(place, _unknown(name, "thruster", [*facts.thrusts]), True)
+                cure = cure_of(name, facts.thrusts)
+                yield Finding(place, f"no thruster is called {shown(name)}; {cure}", True)
             elif key == "thrust" and facts.thrusts[name] is None:
                 for size in DISTRIBUTIONS:
                     if facts.number("force", *place, size) is not None:
@@ -542,12 +532,9 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     for row, (first, second, _) in enumerate(pairs):
         for place, name in enumerate((first, second)):
             if name not in correlated:
-                close = nearest(name, correlated)
-                cure = f"known here: {', '.join(correlated) or 'none'}"
-                if close is not None:
-                    cure = f"did you mean {shown(close)}?"
-                problem = f"the dispersions have no input called {shown(name)}; {cure}"
-                faults.append(Finding((*path, row, place), problem))
+                problem = f"the dispersions have no input called {shown(name)}"
+                cure = cure_of(name, correlated)
+                faults.append(Finding((*path, row, place), f"{problem}; {cure}"))
             elif name in fixed:
                 problem = f"{shown(name)} is a fixed offset (bias), which does not vary"
                 faults.append(Finding((*path, row, place), problem))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nutdamp.errors import nearest, printable
+from nutdamp.errors import cure_of, printable
 from nutdamp.files.tabular import Row, Table
 from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.causes import broken_limits
@@ -101,10 +101,7 @@ def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Bloc
     channels = [channel.name for channel in spacecraft.channels]
     name = row["channel"]
     if name not in channels:
-        cure = f"it has {', '.join(map(shown, channels)) or 'none'}"
-        close = nearest(name, channels)
-        if close is not None:
-            cure = f"did you mean {shown(close)}?"
+        cure = cure_of(name, channels)
         row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
     delay, width = (_time(row, spacecraft, name, column) for name, column in columns.items())
     if width == 0.0:
@@ -289,11 +286,8 @@ def _missing(name: str, channels: Channels, on_time: float) -> str:
         return f"{nothing}, unless {columns} give an ideal impulse"
     if name == STEERABLE:
         return f"a steered pulse needs {columns}"
-    names = f" (it has {', '.join(map(shown, channels))})" if channels else ""
-    close = nearest(name, channels)
-    if close is not None:
-        names = f" (did you mean {shown(close)}?)"
-    return f"{shown(name)}, not in the spacecraft file{names}, needs {columns}"
+    cure = cure_of(name, channels)
+    return f"{shown(name)}, not in the spacecraft file ({cure}), needs {columns}"
 
 
 def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:
