@@ -347,9 +347,8 @@ class _CommandGroup(click.Group):
         """The command that is named; a usage error suggests the nearest name."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
-            ctx.fail(
-                f"there is no command {name!r}; {cure_of(name, COMMANDS, '`nutdamp -h` lists them')}"
-            )
+            cure = cure_of(name, COMMANDS, "`nutdamp -h` lists them")
+            ctx.fail(f"there is no command {name!r}; {cure}")
         return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
