@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, Infeasible, nearest, warn
+from nutdamp.errors import BadRequest, Infeasible, cure_of, warn
 from nutdamp.schemes.catalogue import (
     LEAST,
     NAMES,
@@ -142,32 +142,23 @@ def _expected(spacecraft: Spacecraft) -> Spacecraft:
 
 def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
     """Names of schemes that there are, each once; raises BadRequest."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise BadRequest(
-            "names: expected a list of schemes, such as ['two-pulse'], "
-            f"got {units.as_given(values)}"
-        )
+    several = isinstance(values, Iterable) and not isinstance(values, str)
+    units.expect(several, "names", values, "a list of schemes, such as ['two-pulse']")
     names = tuple(values)
     for name in names:
         if not isinstance(name, str) or name not in NAMES:
-            close = nearest(name, NAMES) if isinstance(name, str) else None
-            cure = f"there are {', '.join(NAMES)}" if close is None else f"did you mean {close!r}?"
-            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure}")
+            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure_of(name, NAMES)}")
     return tuple(dict.fromkeys(names))
 
 
 def _expect_options(
-    value: Any, chosen: Mapping[str, Any], scheme: str | None = None
+    value: Choice, chosen: Mapping[str, Any], scheme: str | None = None
 ) -> Options | SchemeOptions | None:
     """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
     BadRequest.
     """
-    if not (value is None or isinstance(value, Options | SchemeOptions)) or (
-        value is not None and chosen
-    ):
-        raise BadRequest(
-            f"options: expected nutdamp.Options(…) or keywords, got {units.as_given(value)}"
-        )
+    fits = value is None or (isinstance(value, Options | SchemeOptions) and not chosen)
+    units.expect(fits, "options", value, "nutdamp.Options(…) or keywords")
     if not chosen:
         return value
     options = Options(**chosen)
@@ -303,7 +294,7 @@ def robust(
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
     """Load the pulses of a CSV file as ``plan --csv`` writes it, as a plan of that name.
 
-    Warns where columns contradict each other or a limit is broken. Raises CannotRead, or
+    Warns where a limit is broken. Raises CannotRead, or
     FaultyFile.
 
     Examples
@@ -424,7 +415,7 @@ def disperse(
     >>> nutdamp.disperse(nutdamp.plan(nutdamp.example(), "two-pulse"), 100)
     <Dispersion: 100 of 100 cases comply>
     """
-    from nutdamp.files import export as rows
+    from nutdamp.files.export import SamplesWriter, streamed
     from nutdamp.montecarlo import study as dispersion
     from nutdamp.planning.plan import feasible
     from nutdamp.planning.screening import Dispersion
@@ -433,8 +424,6 @@ def disperse(
     count = None if samples is None else units.count("samples", samples)
     if study.lightening_error:
         remark(study.lightening_error)
-    if csv is not None:
-        rows.check_room(units.path("csv", csv), study, count or work.SAMPLES)
 
     def fly(collect: Callable[..., None] | None) -> Results:
         run = functools.partial(
@@ -444,8 +433,7 @@ def disperse(
             stage = functools.partial(run, watch=task.reach, collect=collect)
             return dispersion.flown_in_stages(study, count, fly=stage, stopped=stopped)
 
-    flown, unsaved = rows.streamed(csv, study, rows.SamplesWriter, fly)
-    return Dispersion(flown, unsaved, plan=plan)
+    return Dispersion(*streamed(csv, study, SamplesWriter, fly), plan=plan)
 
 
 def disperse_loop(

@@ -37,6 +37,24 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return folded[close[0]] if close else None
 
 
+# names that a message lists, and among which it looks for the one that was meant: a search among
+# thousands of thrusters would take long
+MOST_NAMES = 20
+
+
+def cure_of(word: object, names: Iterable[str], otherwise: str = "") -> str:
+    """``did you mean 'T1'?`` for a misspelt name; else the names that there are, or
+    ``otherwise``.
+    """
+    every = [*names]
+    few = every[:MOST_NAMES]
+    close = nearest(word, few) if isinstance(word, str) else None
+    if close is not None:
+        return f"did you mean {close!r}?"
+    more = " …" if len(every) > MOST_NAMES else ""
+    return otherwise or f"there are {', '.join(map(repr, few)) or 'none'}{more}"
+
+
 class Fault(NamedTuple):
     """One thing wrong in an input file.
 

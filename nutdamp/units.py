@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from os import PathLike, fspath
 from types import UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from nutdamp.errors import BadRequest
 
@@ -108,6 +108,9 @@ LARGEST = 1e15
 """Largest magnitude in SI: nothing physical is larger,
 and results of larger values could overflow.
 """
+
+FASTEST = 100.0
+"""rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm."""
 
 LARGEST_SEED = 2**64 - 1
 """Largest seed of random numbers."""
@@ -255,6 +258,15 @@ def screen_unit(unit: str, scale: float = 1.0) -> tuple[str, float]:
     return customary + unit[replaced.end() :], scale * factors[replaced[0]] / factors[customary]
 
 
+def reading(value: float, kind: str, meant: str) -> str:
+    """The reading of a bare number, and the text to write where ``meant`` is its likelier unit."""
+    number = f"{value:.12g}"
+    si = KINDS[kind].si
+    unit = f"rad ({math.degrees(value):.4g} deg)" if kind == "angle" else si
+    cure = f"write {number} {meant} if that is meant, else {number} {si}"
+    return f"{number} is read as {number} {unit}; {cure}"
+
+
 def bar(pressure: float) -> str:
     """A pressure given in Pa as people read it."""
     return f"{1e-5 * pressure:.4g} bar"
@@ -279,14 +291,13 @@ Record = TypeVar("Record", bound=Any)
 def expect(fits: bool, name: str, value: object, expected: str) -> None:
     """Raise BadRequest for an argument whose ``value`` does not fit."""
     if not fits:
-        raise BadRequest(f"{name} = {as_given(value)}: expected {expected}")
+        raise BadRequest(f"{name}: expected {expected}, got {as_given(value)}")
 
 
-def instance(name: str, value: object, kind: type[Instance], expected: str) -> Instance:
+def instance(name: str, value: Any, kind: type[Instance], expected: str) -> Instance:
     """``value``, where it is of the ``kind``; raises BadRequest."""
-    if isinstance(value, kind):
-        return value
-    raise BadRequest(f"{name}: expected {expected}, got {as_given(value)}")
+    expect(isinstance(value, kind), name, value, expected)
+    return cast("Instance", value)
 
 
 def path(name: str, value: str | PathLike[str], expected: str = "the name of a file") -> str:
@@ -298,10 +309,9 @@ def path(name: str, value: str | PathLike[str], expected: str = "the name of a f
 def changes(value: Any) -> Mapping[str, object]:
     """Keys and their new values; raises BadRequest."""
     keys = {} if value is None else value
-    if isinstance(keys, Mapping) and all(isinstance(key, str) for key in keys):
-        return keys
-    expected = "a mapping such as {'limits.horizon': '300 s'}"
-    raise BadRequest(f"set: expected {expected}, got {as_given(value)}")
+    fits = isinstance(keys, Mapping) and all(isinstance(key, str) for key in keys)
+    expect(fits, "set", value, "a mapping such as {'limits.horizon': '300 s'}")
+    return cast("Mapping[str, object]", keys)
 
 
 def end_of_flight(value: Any) -> float:
@@ -391,9 +401,8 @@ def replaced(value: Record, fields: Mapping[str, object], types: dict[str, Any])
         if name not in declared:
             raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(declared)}")
         vector = declared[name].startswith("Vector") and entry is not None
-        if not (_is_vector(entry) if vector else _fits(entry, kinds[name])):
-            expected = "three numbers" if vector else declared[name]
-            raise BadRequest(f"{name}: expected {expected}, got {as_given(entry)}")
+        fits = _is_vector(entry) if vector else _fits(entry, kinds[name])
+        expect(fits, name, entry, "three numbers" if vector else declared[name])
         values[name] = np.array(entry, dtype=float) if vector else entry
     return dataclasses.replace(value, **values)
 

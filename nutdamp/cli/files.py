@@ -45,7 +45,7 @@ from nutdamp.cli.options import (
 from nutdamp.cli.plan import compared_with, robust_of, scheme_option
 from nutdamp.cli.studies import flown_options, fronts_of, plan_or_read
 from nutdamp.common.work import SAMPLES
-from nutdamp.errors import BadRequest, nearest, printable
+from nutdamp.errors import BadRequest, cure_of, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
 from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
 
@@ -192,12 +192,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
         show(examples_screen(tuple((name, example_subject(name)) for name in example_names())))
         return
     if name and name not in example_names():
-        close = nearest(name, example_names())
-        cure = (
-            f"did you mean {close!r}?"
-            if close
-            else "`nutdamp init --list` lists those that there are"
-        )
+        cure = cure_of(name, example_names(), "`nutdamp init --list` lists those that there are")
         raise click.BadParameter(f"there is no example {name!r}; {cure}", param_hint="'--from'")
     text = example_text(name or BUILT_IN)
     if file != STDOUT and check_place(file).exists() and not force:

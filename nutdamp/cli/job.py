@@ -16,7 +16,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.main import QUIET, UNITS, look_of_screen, say, show, working
+from nutdamp.cli.main import QUIET, UNITS, in_context, look_of_screen, say, show, working
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -53,17 +53,12 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion")  # pictures that ``--plot`` can draw, the default first
 
 
-def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
-    ctx.meta[UNITS] = value
-
-
-def _quiet(ctx: click.Context, _: click.Parameter, value: bool) -> bool:
-    ctx.meta[QUIET] = value
-    return value
-
-
 quiet_option = click.option(
-    "-q", "--quiet", is_flag=True, callback=_quiet, help="Hide progress, notes and next steps."
+    "-q",
+    "--quiet",
+    is_flag=True,
+    callback=in_context(QUIET),
+    help="Hide progress, notes and next steps.",
 )
 
 
@@ -74,7 +69,7 @@ def screen_options(command: Command) -> Command:
         type=NameType((SI, US)),
         default=SI,
         expose_value=False,
-        callback=_units,
+        callback=in_context(UNITS),
         help="Units of the screen, default si; files are SI.",
     )
     verbose = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
@@ -365,7 +360,10 @@ class Job:
 
 
 def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
-    """The job of a command line; the ``parameters`` that belong to it are taken from them."""
+    """The job of a command line; the ``parameters`` that belong to it are taken from them.
+
+    A usage error where several name the pulses to fly.
+    """
     types = {each.name: each.type for each in command.params if each.name in parameters}
     spacecraft = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
     written = {
@@ -382,6 +380,9 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
         path for paths in inputs for path in (paths if isinstance(paths, tuple) else (paths,))
     )
     flown = FlownChoice(*(parameters.pop(name, None) for name in FlownChoice._fields))
+    if flown.count(None) < len(flown) - 1:
+        problem = "name one of --scheme, --schedule and --blocks"
+        raise click.UsageError(problem, click.get_current_context())
     options = options_in(command, parameters)
     aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
     usual = next((str(each.default) for each in command.params if each.name == "figure"), None)

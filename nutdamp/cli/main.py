@@ -16,19 +16,19 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from time import monotonic as clock
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
 from nutdamp import __version__
-from nutdamp.errors import Infeasible, nearest, printable
+from nutdamp.errors import Infeasible, cure_of, printable
 from nutdamp.units import SI, screen_units
 
 if TYPE_CHECKING:
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from nutdamp.common.work import Monitor
     from nutdamp.planning.decision import Comparison
     from nutdamp.planning.verdict import Status
+
+Value = TypeVar("Value")
 
 DONE = 0
 UNREADABLE = 1
@@ -189,10 +191,20 @@ class _Visible:
             yield Segment(text if control else visible(text), style, control)
 
 
-UNITS = "nutdamp.units"  # key of ``--units`` in the context of a command line
+# keys of options in the context of a command line
+UNITS = "nutdamp.units"
+QUIET = "nutdamp.quiet"
+DEBUG = "nutdamp.debug"
 
 
-QUIET = "nutdamp.quiet"  # key of ``--quiet`` in the context of a command line
+def in_context(key: str) -> Callable[[click.Context, click.Parameter, Value], Value]:
+    """Callback of an option that puts its value into the context too, behind ``key``."""
+
+    def callback(ctx: click.Context, _: click.Parameter, value: Value) -> Value:
+        ctx.meta[key] = value
+        return value
+
+    return callback
 
 
 @contextmanager
@@ -206,18 +218,11 @@ def look_of_screen() -> Iterator[None]:
         yield
 
 
-DEBUG = "nutdamp.debug"  # key of ``--debug`` in the context of a command line
-
-
-def _debugging(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    ctx.meta[DEBUG] = value
-
-
 debug_option = click.option(
     "--debug",
     is_flag=True,
     expose_value=False,
-    callback=_debugging,
+    callback=in_context(DEBUG),
     help="Show the traceback of an internal error.",
 )
 
@@ -342,10 +347,8 @@ class _CommandGroup(click.Group):
         """The command that is named; a usage error suggests the nearest name."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
-            close = nearest(name, COMMANDS)
-            ctx.fail(
-                f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else "")
-            )
+            cure = cure_of(name, COMMANDS, "`nutdamp -h` lists them")
+            ctx.fail(f"there is no command {name!r}; {cure}")
         return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002

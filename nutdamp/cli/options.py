@@ -101,13 +101,6 @@ class UnitType(click.ParamType):  # type: ignore[type-arg]
 END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
 
 
-def reading_of(value: float, kind: str, meant: str) -> str:
-    """See `rules.reading`, of a number on the command line."""
-    from nutdamp.files.rules import reading
-
-    return reading(int(value) if value.is_integer() else float(value), kind, meant)
-
-
 class Angles(NamedTuple):
     """Two angles in rad that name a direction."""
 
@@ -117,11 +110,13 @@ class Angles(NamedTuple):
     @property
     def readings(self) -> tuple[str, ...]:
         """Readings of unitless numbers that are likely degrees: whole, and more than a turn."""
-        bare = [angle for angle in self if isinstance(angle, Bare)]
         doubtful = [
-            angle for angle in bare if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
+            angle
+            for angle in self
+            if isinstance(angle, Bare)
+            if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
         ]
-        return tuple(reading_of(angle, "angle", "deg") for angle in doubtful)
+        return tuple(units.reading(angle, "angle", "deg") for angle in doubtful)
 
 
 class Direction(click.ParamType):  # type: ignore[type-arg]
@@ -170,8 +165,6 @@ class Count(click.ParamType):  # type: ignore[type-arg]
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 GOAL = "Goal and motion"  # heading of the options of the goal
-# rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm
-FASTEST = 100.0
 WIDEST = 26  # characters of an option that its help comes beside; below a longer one
 SHARED = names_of(SchemeOptions)  # options of every scheme
 NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
@@ -294,8 +287,10 @@ class Aim(NamedTuple):
                 problem = f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)"
                 raise click.BadParameter(problem, param_hint="--spin")
             goal = dataclasses.replace(goal, spin=spin)
-        if isinstance(self.spin, Bare) and (self.spin.is_integer() or abs(self.spin) > FASTEST):
-            doubt(f"--spin: {reading_of(self.spin, 'rate', 'rpm')}")
+        if isinstance(self.spin, Bare) and (
+            self.spin.is_integer() or abs(self.spin) > units.FASTEST
+        ):
+            doubt(f"--spin: {units.reading(self.spin, 'rate', 'rpm')}")
         for option, angles in (("--target", self.target), ("--sun", self.sun)):
             for reading in () if angles is None else angles.readings:
                 doubt(f"{option}: {reading}")

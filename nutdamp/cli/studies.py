@@ -44,13 +44,12 @@ from nutdamp.cli.options import (
     UnitType,
     expect_read,
     goal_options,
-    reading_of,
 )
 from nutdamp.cli.plan import compared_with, scheme_option
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import CannotWrite, Infeasible, printable
 from nutdamp.schemes.catalogue import LEAST, NAMES, OPTIMAL, SchemeOptions
-from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
+from nutdamp.units import LARGEST_SEED, reading, shifts, thresholds, tilt
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -65,24 +64,12 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
     """``--scheme`` (its help may differ), ``--schedule`` and ``--blocks``: one alone."""
     default = f"{verb} this scheme with default options; without it the recommended one."
 
-    def alone(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-        named = [
-            name
-            for name in ("scheme", "schedule", "blocks")
-            if name != param.name and ctx.params.get(name)
-        ]
-        if value is not None and named:
-            raise click.UsageError(
-                f"name what to {verb.lower()}: one of --scheme, --schedule and --blocks"
-            )
-        return value
-
     def decorate(command: Command) -> Command:
         read = f"{verb} the pulses of a CSV file, as `plan --csv` writes it."
         fired = f"{verb} what the command blocks of a CSV file fire, as `plan --blocks` writes it."
-        command = click.option("--blocks", type=FILE, callback=alone, help=fired)(command)
-        command = click.option("--schedule", type=FILE, callback=alone, help=read)(command)
-        return scheme_option(type=NameType(NAMES), callback=alone, help=scheme or default)(command)
+        command = click.option("--blocks", type=FILE, help=fired)(command)
+        command = click.option("--schedule", type=FILE, help=read)(command)
+        return scheme_option(type=NameType(NAMES), help=scheme or default)(command)
 
     return decorate
 
@@ -315,7 +302,7 @@ def trade_command(
     allowed = allow or (0.0, math.inf)
     for shift in allow:
         if isinstance(shift, Bare) and shift:
-            job.doubt(f"--allow: {reading_of(shift, 'angle', 'deg')}")
+            job.doubt(f"--allow: {reading(shift, 'angle', 'deg')}")
     job.begin([] if schedules is None else schedule_paths(schedules, points * len({*allowed})))
     expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.doubt)
     traded = fronts_of(job, points, allowed, least)
@@ -433,8 +420,8 @@ def budget_command(
     `nutdamp plan`.
     """
     spacecraft = job.begin()
-    for reading in (text for pair in pairs for text in pair.readings):
-        job.doubt(f"--thresholds: {reading}")
+    for text in (text for pair in pairs for text in pair.readings):
+        job.doubt(f"--thresholds: {text}")
 
     from nutdamp.api import budget
 

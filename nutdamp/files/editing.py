@@ -22,7 +22,7 @@ import numpy as np
 import yaml
 
 from nutdamp.common.time import Epoch
-from nutdamp.errors import BadRequest, Fault, FaultyFile, nearest
+from nutdamp.errors import BadRequest, Fault, FaultyFile, cure_of
 from nutdamp.files.fields import KeyPath
 from nutdamp.files.yaml import MAX_DEPTH, Node, Place, dotted, read_tree, read_value
 from nutdamp.physics import attitude
@@ -202,12 +202,7 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
         raise _NoPlaceError(
             f"expected a position, such as {dotted((*behind, 0))}: the entries have no names"
         )
-    close = nearest(step, texts) if isinstance(step, str) else None
-    cure = (
-        f"did you mean {shown(close)}?"
-        if close
-        else f"there are {', '.join(map(shown, texts[:8]))}"
-    )
+    cure = cure_of(step, texts)
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime
 import math
-import shutil
 from collections.abc import Callable, Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
@@ -20,12 +19,12 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
-from nutdamp.files.tabular import STDOUT, csv_text, whole_file
+from nutdamp.files.tabular import csv_text, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
-from nutdamp.montecarlo.statistics import OUTPUTS, Array
+from nutdamp.montecarlo.statistics import Array
 from nutdamp.montecarlo.study import Study
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -248,8 +247,6 @@ OUTPUT_COLUMNS = (
 )
 """Columns of `OUTPUTS`, in their order."""
 
-SHORTEST = 12  # bytes that a number takes at least, on average, with its comma
-
 
 def cone_columns(spacecraft: Spacecraft) -> list[str]:
     """Headings of the least and the largest angle to the direction of each cone."""
@@ -300,24 +297,6 @@ def _texts(values: Array) -> list[str]:
     return [""] * len(values) if math.isnan(values[0]) else list(map(repr, values.tolist()))
 
 
-def check_room(path: str, study: Study, samples: int) -> None:
-    """Raise CannotWrite where a disk cannot hold so many rows."""
-    if path == STDOUT or (Path(path).exists() and not Path(path).is_file()):
-        return
-    needed = (
-        samples
-        * SHORTEST
-        * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))
-    )
-    try:
-        free = shutil.disk_usage(Path(path).resolve().parent).free
-    except OSError:
-        return  # the folder cannot be looked at: writing will say why
-    if needed > free:
-        room = f"{needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free there"
-        raise CannotWrite(path, f"{samples} rows take more than {room}")
-
-
 class FlownCases(Protocol):
     """Results of cases, of which ``done`` have flown."""
 
@@ -338,35 +317,35 @@ def streamed(
     Returns what ``fly`` does, and the error if they are not all saved. Raises CannotWrite where no
     case has flown yet, KeyboardInterrupt where the flight ended before the first.
     """
-    results: list[Flown] = []
 
-    def fly_some(collect: Callable[..., None] | None) -> Flown:
-        results.append(fly(collect))
-        if not results[0].done:
+    def flown(collect: Callable[..., None] | None) -> Flown:
+        results = fly(collect)
+        if not results.done:
             raise KeyboardInterrupt  # so that no file is written
-        return results[0]
+        return results
 
     if path is None:
-        return fly_some(None), None
+        return flown(None), None
+    results: Flown | None = None
     full: list[OSError] = []
+
+    def collect(*part: Any) -> None:
+        try:
+            if not full:
+                rows.write(*part)
+        except BrokenPipeError:
+            raise
+        except OSError as reason:
+            full.append(reason)
+
     try:
         with whole_file(fspath(path)) as stream:
             rows = writer(stream, study)
-
-            def collect(*part: Any) -> None:
-                try:
-                    if not full:
-                        rows.write(*part)
-                except OSError as reason:
-                    if isinstance(reason, BrokenPipeError):
-                        raise
-                    full.append(reason)
-
-            fly_some(collect)
+            results = flown(collect)
             if full:
                 raise full[0]
     except CannotWrite as wrong:
-        if not results:
+        if results is None:
             raise
-        return results[0], wrong
-    return results[0], None
+        return results, wrong
+    return results, None

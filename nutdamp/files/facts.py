@@ -53,10 +53,6 @@ class Facts:
         node = self.root.get(*path)
         return None if node is None else node.value
 
-    def is_mapping(self, *path: str | int) -> bool:
-        """True where keys may be at ``path``."""
-        return isinstance(self.value(*path), dict)
-
     def text(self, *path: str | int) -> str | None:
         """The text at ``path``."""
         value = self.value(*path)

@@ -158,12 +158,6 @@ def _tolerance(kind: str, value: object, quantity: str) -> Tolerance:
     return Tolerance(kind, size, relative)
 
 
-@cache
-def tolerance_section(quantity: str) -> type[ToleranceSection]:
-    """The section of the tolerances of a ``quantity``."""
-    return type("ToleranceSection", (ToleranceSection,), {"quantity": quantity})
-
-
 class _Tolerance(Rule):
     """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which
     may be for all.
@@ -205,13 +199,6 @@ class _Tolerance(Rule):
         return single
 
 
-def _written(section: type[ToleranceSection], each: Each) -> Any:
-    """The type of a tolerance, or of those of each axis or thruster."""
-    if each == "axis":
-        return Annotated[list[section], Length(3, 3)] | section  # type: ignore[valid-type]
-    return dict[str, section] if each == "thruster" else section  # type: ignore[valid-type]
-
-
 _TOLERANCES = {each.name: each.metadata for each in fields(Dispersions) if each.metadata}
 QUANTITIES = {
     key: declared["kind"] for key, declared in _TOLERANCES.items()
@@ -242,7 +229,11 @@ class DispersionsSection(Section):
         keys = {}
         for key, declared in _TOLERANCES.items():
             rule = _Tolerance(declared["kind"], declared["each"])
-            written = _written(tolerance_section(rule.kind), rule.each)
+            section: Any = type("ToleranceSection", (ToleranceSection,), {"quantity": rule.kind})
+            written: Any = {
+                "axis": Annotated[list[section], Length(3, 3)] | section,
+                "thruster": dict[str, section],
+            }.get(rule.each, section)
             keys[key] = Key(
                 Annotated[written, rule] | None,
                 None,

@@ -36,7 +36,7 @@ from nutdamp.files import keys
 from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.keys import LoopSection, by_name, dispersions, thrust_behind
-from nutdamp.files.rules import correlation_findings, disturbance_kind, doubts, findings
+from nutdamp.files.rules import correlation_findings, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude
 from nutdamp.physics.body import principal_axes
@@ -442,11 +442,10 @@ def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) 
         torque = inertia.axes.T @ torque
         torque[np.abs(torque) <= CANCELLED * math.hypot(*torque)] = 0.0
     rate = 0.0
-    if (
-        disturbance_kind(entry.kind, entry.rate is not None or entry.fixed_in is not None)
-        == "rotating"
-    ):
-        rate = -spin if entry.rate is None else entry.rate
+    if entry.rate is not None:
+        rate = entry.rate
+    elif entry.kind == "rotating" or entry.fixed_in is not None:
+        rate = -spin
     return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 
@@ -552,9 +551,13 @@ def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
 def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the spacecraft file, for editors."""
     parts: dict[str, Any] = {}
-    whole = {**section_schema(keys.SpacecraftFile, parts), "title": "nutdamp spacecraft file"}
-    schema = {"$defs": dict(sorted(parts.items())), **whole}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_in_order(schema)}
+    schema = section_schema(keys.SpacecraftFile, parts)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "nutdamp spacecraft file",
+        "$defs": parts,
+    }
 
 
 def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, Any]:
@@ -610,13 +613,3 @@ def _ruled_schema(
     if not rules:
         return _schema(annotation, parts)
     return rules[-1].schema(lambda: _ruled_schema(annotation, rules[:-1], parts))
-
-
-def _in_order(schema: Any, within: str = "") -> Any:
-    """Keywords in the order of the alphabet, properties in that of the section."""
-    if isinstance(schema, dict):
-        names = schema if within in ("properties", "default") else sorted(schema)
-        return {
-            name: _in_order(schema[name], name if within != "properties" else "") for name in names
-        }
-    return [_in_order(entry, within) for entry in schema] if isinstance(schema, list) else schema

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nutdamp.errors import nearest, printable
+from nutdamp.errors import cure_of, printable
 from nutdamp.files.tabular import Row, Table
 from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.causes import broken_limits
@@ -65,13 +65,17 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     the file.
     """
     table = Table(path, BLOCKS_HEADER, "blocks")
-    times = [
-        f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES
-    ]
-    table.expect("channel", "first_sun_pulse", *times, "count")
+    columns = {}
+    for name in TIMES:
+        counted = f"{name}_counts" in table.header and f"{name}_s" not in table.header
+        columns[name] = f"{name}_counts" if counted else f"{name}_s"
+        if counted and spacecraft.commands is None:
+            problem = f"the spacecraft file has no commands to count the {name} in"
+            table.fault(1, columns[name], f"{problem}; expected the column {name}_s")
+    table.expect("channel", "first_sun_pulse", *columns.values(), "count")
     blocks: list[Block] = []
     for row in table.rows:
-        block = _block(row, spacecraft)
+        block = _block(row, spacecraft, columns)
         if block is None:
             continue
         last = blocks[-1].sun_pulses[-1] if blocks else 0
@@ -91,32 +95,17 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
 TIMES = ("delay", "width")
 
 
-def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
-    """True where delay or width of the blocks is given by counts alone, of the commands in the
-    spacecraft file.
-    """
-    alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
-    if alone and spacecraft.commands is None:
-        problem = f"the spacecraft file has no commands to count the {name} in"
-        table.fault(1, f"{name}_counts", f"{problem}; expected the column {name}_s")
-    return alone
-
-
-def _block(row: Row, spacecraft: Spacecraft) -> Block | None:
-    """The block of a row; None for a fault."""
+def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block | None:
+    """The block of a row, with the ``columns`` of its times; None for a fault."""
     faults = len(row.table.faults)
     channels = [channel.name for channel in spacecraft.channels]
     name = row["channel"]
     if name not in channels:
-        cure = f"it has {', '.join(map(shown, channels)) or 'none'}"
-        close = nearest(name, channels)
-        if close is not None:
-            cure = f"did you mean {shown(close)}?"
+        cure = cure_of(name, channels)
         row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
-    delay, width = (_time(row, spacecraft, name) for name in TIMES)
+    delay, width = (_time(row, spacecraft, name, column) for name, column in columns.items())
     if width == 0.0:
-        column = "width_s" if "width_s" in row else "width_counts"
-        row.fault(column, "0 s fires nothing; expected a time above 0")
+        row.fault(columns["width"], "0 s fires nothing; expected a time above 0")
     row.setdefault("every", "1")
     first = _whole(row, "first_sun_pulse", LATEST)
     count = _whole(row, "count", MOST_FIRED)
@@ -134,19 +123,16 @@ def _whole(row: Row, column: str, highest: int) -> int:
     return int(value or 1)
 
 
-def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
+def _time(row: Row, spacecraft: Spacecraft, name: str, column: str) -> float | None:
     """A delay or width, s: as it is given, or so many steps; None for a fault."""
-    in_seconds = f"{name}_s" in row
-    column = f"{name}_s" if in_seconds else f"{name}_counts"
     commands = spacecraft.commands
     value = row.number(column)
     if value is None:
         return None
     if value < 0.0:
-        unit = " s" if in_seconds else ""
-        row.fault(column, f"{value:g}{unit} is negative; expected at least 0")
+        row.fault(column, f"{row[column]} is negative; expected at least 0")
         return None
-    if in_seconds or commands is None:
+    if column.endswith("_s") or commands is None:
         return value
     if not value.is_integer():
         row.fault(column, f"expected a whole number of steps, got {row[column]}")
@@ -300,11 +286,8 @@ def _missing(name: str, channels: Channels, on_time: float) -> str:
         return f"{nothing}, unless {columns} give an ideal impulse"
     if name == STEERABLE:
         return f"a steered pulse needs {columns}"
-    names = f" (it has {', '.join(map(shown, channels))})" if channels else ""
-    close = nearest(name, channels)
-    if close is not None:
-        names = f" (did you mean {shown(close)}?)"
-    return f"{shown(name)}, not in the spacecraft file{names}, needs {columns}"
+    cure = cure_of(name, channels)
+    return f"{shown(name)}, not in the spacecraft file ({cure}), needs {columns}"
 
 
 def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:

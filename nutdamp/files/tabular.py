@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import cleaned, finite
 from nutdamp.errors import CannotWrite, Fault, FaultyFile, nearest
-from nutdamp.files.yaml import read_limited, utf8_text
+from nutdamp.files.yaml import decode, read_limited
 from nutdamp.flight.propagation import Track, in_file_axes
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.units import shown
@@ -241,7 +241,7 @@ class Table:
         self.known = columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}
-        text = utf8_text(read_limited(self.name, MOST_BYTES), self.name)
+        text = decode(read_limited(self.name, MOST_BYTES), self.name)
         reader = csv.reader(io.StringIO(text, newline=""))
         try:
             rows = [(reader.line_num, row) for row in reader if row]

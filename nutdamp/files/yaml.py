@@ -50,29 +50,19 @@ def read_bytes(path: str, most: int = -1) -> bytes:
         raise CannotRead(path, reason.lower()) from error
 
 
-def read_limited(path: str, most: int) -> bytes:
+MAX_BYTES = 1 << 20  # of a spacecraft file
+
+
+def read_limited(path: str, most: int = MAX_BYTES) -> bytes:
     """Contents of a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is
     larger.
     """
     data = read_bytes(path, most + 1)
     if len(data) > most:
-        raise FaultyFile([Fault(path, 1, 1, "", f"larger than {most >> 20} MiB")])
+        raise FaultyFile([Fault(path, 0, 0, "", f"too large: more than {most >> 20} MiB")])
     return data
 
 
-def utf8_text(data: bytes, name: str) -> str:
-    """The text of UTF-8 bytes, without a byte order mark; raises FaultyFile, which calls the file
-    ``name``.
-    """
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as reason:
-        raise FaultyFile(
-            [Fault(name, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]
-        ) from reason
-
-
-MAX_BYTES = 1 << 20
 MAX_NODES = 10_000  # values in a file, those that aliases repeat counted each time
 MAX_DEPTH = 32
 
@@ -165,7 +155,7 @@ def read_text(path: Path) -> str:
     """Text of a file; raises `CannotRead`, or `FaultyFile` where it is too large, binary or not
     UTF-8.
     """
-    return decode(read_bytes(str(path), MAX_BYTES + 1), str(path))
+    return decode(read_limited(str(path)), str(path))
 
 
 def decode(data: bytes, name: str) -> str:
@@ -175,13 +165,11 @@ def decode(data: bytes, name: str) -> str:
         before = data[:position].decode(errors="replace")
         return FaultyFile([_place(before, len(before)).fault(name, "", problem)])
 
-    if len(data) > MAX_BYTES:
-        raise FaultyFile([Fault(name, 0, 0, "", "too large: more than 1 MiB")])
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise fault(0, "the text is UTF-16; save it as UTF-8")
     if b"\0" in data:
         position = data.index(b"\0")
-        raise fault(position, f"binary data (a zero byte at byte {position}); expected a YAML text")
+        raise fault(position, f"binary data (a zero byte at byte {position}); expected a text")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

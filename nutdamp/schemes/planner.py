@@ -11,13 +11,13 @@ from importlib import import_module
 
 from nutdamp.common import work
 from nutdamp.common.results import note
-from nutdamp.errors import BadRequest, Infeasible, TooShort
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
 from nutdamp.schemes.correction import Correction, SymmetricModel, left, model_of
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.units import as_given
+from nutdamp.units import instance
 
 # rad that a schedule laid on the symmetric body leaves from which one is laid on the true motion
 MODELLED = 1e-6
@@ -40,11 +40,8 @@ def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOpt
     required = spacecraft.requirement
     if isinstance(own, Options):
         own = own.of(scheme.options)
-    if not isinstance(own, scheme.options):
-        raise BadRequest(
-            f"options of {scheme.name}: expected {scheme.options.__name__}(…), "
-            f"got {as_given(chosen)}"
-        )
+    expected = f"{scheme.options.__name__}(…)"
+    own = instance(f"options of {scheme.name}", own, scheme.options, expected)
     bound = required is not None and required.momentum_shift is not None
     return own.settled(keeps_axis=bound or spacecraft.goal.axis is not None)
 

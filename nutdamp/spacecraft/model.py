@@ -402,8 +402,7 @@ class Spacecraft(results.Data, results.Shown):
         changed = units.replaced(self, {"document": None, **fields}, vars(thruster))
         for name in ("mass", "dissipation"):
             value = getattr(changed, name)
-            if value is not None and value <= 0.0:
-                raise BadRequest(f"{name} = {units.as_given(value)}: expected a number above zero")
+            units.expect(value is None or value > 0.0, name, value, "a number above zero")
         return changed
 
     @property

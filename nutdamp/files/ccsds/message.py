@@ -24,7 +24,7 @@ import numpy as np
 from nutdamp.common.time import UNIFORM, Epoch
 from nutdamp.errors import Fault, FaultyFile, listed, nearest
 from nutdamp.files.export import FRAMES
-from nutdamp.files.yaml import read_limited, utf8_text
+from nutdamp.files.yaml import decode, read_limited
 from nutdamp.spacecraft.model import Vector
 
 VERSION = "2.0"  # of APM and AEM in issue 2 of their standard; version 1 has other keywords
@@ -500,7 +500,7 @@ class MessageReader:
             raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
         begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
         within: str | None = None
-        for line, raw in enumerate(_LINE_END.split(utf8_text(data, path)), start=1):
+        for line, raw in enumerate(_LINE_END.split(decode(data, path)), start=1):
             content = raw.strip()
             if not content or content.split(maxsplit=1)[0] == "COMMENT":
                 continue

@@ -332,13 +332,9 @@ def test_what_is_dispersed_is_the_scheme_the_schedule_or_the_recommended_plan(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_tables_that_the_disk_does_not_hold_are_exit_1(run: Run, tmp_path: Path) -> None:
-    """At once, where the number of their rows says so."""
     full = run(*TWO.split(), "--samples", "2000", "--csv", "/dev/full")
     assert (full.returncode, full.stdout) == (1, "")
     assert "cannot write /dev/full: No space left" in full.stderr
-    big = run(*TWO.split(), "--samples", "1e12", "--csv", "big.csv", status=1)
-    assert "cannot write big.csv" in big.stderr
-    assert "GB are free" in big.stderr
     assert names(tmp_path) == sorted(name.replace("_", ".") for name in CRAFTS)
 
 

@@ -316,7 +316,7 @@ def test_what_is_no_such_message(read: Read) -> None:
         with Path("huge.apm").open("wb") as stream:
             stream.write(start.encode())
             stream.truncate(MOST_BYTES + 1)
-        assert faults(read_apm, "huge.apm") == ["1:1: : larger than 16 MiB"]
+        assert faults(read_apm, "huge.apm") == ["0:0: : too large: more than 16 MiB"]
     with pytest.raises(CannotRead):
         read_apm("missing.apm")
 

@@ -196,12 +196,10 @@ def test_any_value_of_any_shape_is_read_or_refused(entry: tuple[str, object]) ->
 # --- numbers without a unit that are hardly meant
 # --------------------------------------------------------------------
 
-DATED = "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: GCRF}\n"
 THRUSTER = (
     "thrusters: [{{name: T, position: [0, {}, 0.8], direction: [1, 0, 0], force: 10, "
     "min_on_time: {}}}]\n"
 )
-TENSOR = "name: X\ninertia: {tensor: [[120, 0, 0], [0, 110, 0], [0, 0, 80]]}\n"
 
 
 def whole(lines: str) -> str:
@@ -227,8 +225,6 @@ def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
         for lines in (
             "state: {spin: 30, nutation: 0.1}",
             "state: {spin: 15, nutation: 0.1}",
-            THRUSTER.format(0.3, "0, isp: 2200"),
-            "steerable: {torque: 3, isp: 2200, lever_arm: 1}",
             "state: {spin: -101.5, nutation: 0.1}",
             "state: {spin: 3, nutation: 0.1, phase: 40}",
             "omega0: [0.1, 0, 180]",
@@ -240,22 +236,13 @@ def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
             THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
             THRUSTER.format(0.3, "0, isp: 200")
             + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
-            THRUSTER.format(0.3, 0) + "cold: {first: 90, pulses: 4}",
-            THRUSTER.format(0.3, "20 ms, max_on_time: 2000"),
             "steerable: {torque: 3, lever_arm: 800}",
-            f"{DATED}orbit: {{position: [0, 7000, 0], velocity: [0, 0, 7500]}}",
-            f"{DATED}orbit: {{position: [0, 7000 km, 0], velocity: [0, 0, -7.5]}}",
             "requirement: {nutation: 0.5}",
             "requirement: {nutation: 0.5 deg, momentum_shift: 0.2}",
-            # 2.9 deg, more than there is
-            "state: {spin: 3, nutation: 2 deg}\nrequirement: {nutation: 0.05}",
-            "omega0: [0.02, 0, 3]\nrequirement: {nutation: 0.05}",
-            f"{TENSOR}omega0: [0.02, 0, 3]\nrequirement: {{nutation: 0.05}}",
             # In the order of the file.
             "omega0: [40, 0.2, 3]\n" + THRUSTER.format(300, 20) + "goal: {spin: 40}",
-            # A turn takes 2.094 s at 3 rad/s, and fifty 104.7 s.
+            # A turn takes 2.094 s at 3 rad/s.
             THRUSTER.format(0.3, "2.15"),
-            THRUSTER.format(0.3, "20 ms, max_on_time: 106"),
         )
     )
     check_text("files.doubts", "\n".join(said))
@@ -273,16 +260,12 @@ def test_units_and_common_numbers_give_no_warning_nor_does_any_file_that_comes_a
             "state: {spin: 300 rpm, nutation: 89 deg, phase: 400 deg}",
             "state: {spin: 27.4, nutation: 0.1, phase: 6.2}",
             "state: {spin: -12, nutation: 0.1, phase: -6.2}",
-            THRUSTER.format(0.3, "0, isp: 2200 s"),
-            THRUSTER.format(0.3, "0, isp: 460"),
             THRUSTER.format("300 m", "20 s"),
             THRUSTER.format(49, 2.0),
             "goal: {tilt: 2.0, azimuth: 5, spin: 12}",
             "requirement: {nutation: 0.01, momentum_shift: 0.09}",
             "requirement: {nutation: 28 deg, momentum_shift: 0.2 rad}",
-            THRUSTER.format(0.3, "20 ms, max_on_time: 2000 s"),
             THRUSTER.format(0.3, "2.05"),
-            THRUSTER.format(0.3, "20 ms, max_on_time: 103"),
             "omega0: [0.1, 0.2, 0.3]\n" + THRUSTER.format(0.3, 20),  # a turn takes 20.9 s
             example_text(),
         ),
@@ -535,10 +518,7 @@ def test_what_validates_and_what_not() -> None:
                 )
 
 
-def test_keywords_are_in_the_order_of_the_alphabet_and_keys_in_that_of_the_file() -> None:
-    for section in [SCHEMA, *SCHEMA["$defs"].values()]:
-        for key, field in section["properties"].items():
-            assert list(field) == sorted(field), key
+def test_keys_are_in_the_order_of_the_file() -> None:
     names = list(SCHEMA["properties"])
     assert (
         names.index("name")
