@@ -222,13 +222,15 @@ def compare(
     nominal = [plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name]
     cheap = SLACK * min(nominal, default=0.0)
     chosen: FlownPlan | None = None
+    unspent = work.FRONTS
     with work.steps(1.5 * count, SEARCH, hook=lambda done, _: progress(done, count)) as steps:
         for number, variations in enumerate(rounds):
             before = len(entries)
-            with work.budget("the robust plans", work.FRONTS), work.no_cures():
+            with work.budget("the robust plans", unspent) as spent, work.no_cures():
                 for variation in variations:
                     _fly(comparison, variation, entries)
                     steps.reach(steps.done + 1)
+            unspent -= spent.done
             chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
             saves = comparison.least == LEAST[0]
             if saves and chosen is not None and chosen.plan.pulses.cost <= cheap:
