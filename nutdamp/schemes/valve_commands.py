@@ -14,6 +14,8 @@ import cmath
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from nutdamp.common import work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort
@@ -44,8 +46,9 @@ ROOM = 0.02
 # plan
 NEARLY = 1.1
 EXACT = 1e-10  # rad, the same
-# plans, at most, each with room for the weakest and the longest pulse of the one before
-ROUNDS = 3
+PLANS = (
+    6  # plans, at most, each with on-times that leave room for the weakest pulse of the one before
+)
 
 EFFECTIVE = (
     " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
@@ -124,48 +127,51 @@ def planned(
 ) -> Schedule:
     """Schedule that ``plan`` gives for the body without valves, as commands for the true one; see
     `as_commands`.
-
-    A fixed point: the body without valves depends on its plan, by the levels of its pulses, the
-    propellant they use and the room that commands need beside them.
     """
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
-    trials: list[tuple[bool, float, Schedule]] = []
-    for _ in range(ROUNDS):
+    tried: list[tuple[bool, float, Schedule]] = []
+    schedule: Schedule | None = None
+    for _ in range(PLANS):
         without = without_valves(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
             schedule = plan(without)
         except Infeasible as reason:
-            if trials:
+            if schedule is not None:
                 break
             if isinstance(reason, TooShort):
                 raise TooShort(reason.why + EFFECTIVE, reason.cure) from None
             raise type(reason)(f"{reason}{EFFECTIVE}") from None
-        assumed = weakest, strongest, room, used
-        levels, longer = _outside(spacecraft, schedule, without.inertia, correct)
-        weakest = min([weakest, *levels])
-        strongest = max([strongest, *levels])
-        if used == 0.0 and shed(spacecraft) is not None:
-            used = schedule.propellant or 0.0
+        too_weak, too_strong, longer = _outside(spacecraft, schedule, without.inertia, correct)
+        if too_weak or too_strong:
+            weakest = min([weakest, *too_weak])
+            strongest = max([strongest, *too_strong])
+            continue
+        if used == 0.0 and shed(spacecraft) is not None and schedule.propellant:
+            used = schedule.propellant  # once more with the moments half-way
+            continue
         try:
             commands = as_commands(spacecraft, schedule, correct, without.inertia)
         except Infeasible:
-            if assumed == (weakest, strongest, room, used):
-                break
-            continue
-        keeps = keeps_limits(spacecraft, commands.pulses)
-        remains = _left(spacecraft, commands, correct)
-        trials.append((not keeps, remains, commands))
-        exact = remains <= NEARLY * _left(without, schedule, correct) + EXACT
-        if not (keeps and (exact or spacecraft.limits.tick is not None)):
-            # What is longer than planned, or has been moved, met its neighbour or a window.
-            room = max(
-                2.0 * room, longer, ROOM * max((pulse.on_time for pulse in schedule), default=0.0)
-            )
-        if assumed == (weakest, strongest, room, used) or work.exhausted():
+            if not tried:
+                raise
             break
-    if not trials:  # with the reason why there are no commands
+        kept = keeps_limits(spacecraft, commands.pulses)
+        left = _left(spacecraft, commands, correct)
+        tried.append((not kept, left, commands))
+        if work.exhausted() or not schedule.pulses:
+            break
+        if kept and (
+            spacecraft.limits.tick is not None
+            or left <= NEARLY * _left(without, schedule, correct) + EXACT
+        ):
+            break
+        # What is longer than planned, or has been moved, met its neighbour or a window: the next
+        # one leaves room.
+        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
+    assert schedule is not None
+    if not tried:
         return as_commands(spacecraft, schedule, correct, without.inertia)
-    return min(trials, key=lambda trial: trial[:2])[2]
+    return min(tried, key=lambda trial: trial[:2])[2]
 
 
 def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> float:
@@ -288,21 +294,28 @@ def _translated(
 
 def _outside(
     spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia, correct: Correction
-) -> tuple[list[float], float]:
-    """Levels of pulses too weak or too strong for any command; s by which one becomes longer at
+) -> tuple[list[float], list[float], float]:
+    """Levels of pulses too weak, and too strong, for any command; s by which one becomes longer at
     each end.
     """
     channels = {channel.name: channel for channel in spacecraft.channels}
-    levels = []
+    weak = []
+    strong = []
     longer = 0.0
     translated = _translated(spacecraft, schedule, inertia, correct, unbounded=True)
     for planned_, pulse in zip(schedule, translated, strict=True):
         longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
-        if pulse.channel in channels:
-            shortest, longest = effective_on_times(channels[pulse.channel])
-            if not shortest * (1.0 - ROUNDING) <= pulse.on_time <= longest * (1.0 + ROUNDING):
-                levels.append(planned_.on_time / pulse.on_time)
-    return levels, longer
+        channel = channels.get(pulse.channel)
+        if channel is None or pulse.torque is None:
+            continue
+        least, most = effective_on_times(channel)
+        level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
+        level = level if shed(spacecraft) is None else planned_.on_time / pulse.on_time
+        if pulse.on_time > most * (1.0 + ROUNDING):
+            weak.append(level)
+        if pulse.on_time < least * (1.0 - ROUNDING):
+            strong.append(level)
+    return weak, strong, longer
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
