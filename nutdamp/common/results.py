@@ -28,8 +28,7 @@ HOME = "nutdamp.page.results"
 """Module with the table of `view`, ``VIEWS``, loaded when it is needed first.
 
 Its keys are the class of a result and a subject (``Trade.csv``). Its values are
-``module:function`` of the package, which takes the result, or ``module:function name key=name``,
-which takes these attributes of it.
+``module:function`` of the package, which takes the result.
 """
 
 
