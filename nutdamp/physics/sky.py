@@ -338,6 +338,7 @@ class SunPulseClock:
     def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
         self.sun, self.sense, self.azimuth = sun, sense, azimuth
         self._stretches = [start]
+        self._latest = start  # motion from which the next Sun pulse is looked for
         self.over = start.since
         ahead, _ = self._ahead(start, sun)
         # as if one had come before t = 0
@@ -399,6 +400,7 @@ class SunPulseClock:
             begun = firing.moved(starts + push.end)._replace(torque=None, slope=None)
             self._stretches.append(firing)
         self._stretches.append(begun._replace(bodies=begun.bodies.lighter(half)))
+        self._latest = self.here
         return starts
 
     def sun_pulse(self, number: int) -> MotionStretch:
@@ -411,13 +413,17 @@ class SunPulseClock:
             pace, (ahead, _) = self._pace, self._ahead(self.here, self.sun)
             passed = np.rint((pace * (self.here.since - self.time) + ahead) / CIRCLE)
             expected = self.here.since + (ahead + CIRCLE * (step - passed)) / pace
-            stretch = self._root(self.here.moved(expected), pace, self.sun, ~self.lost)
+            stretch = self._root(self._latest.moved(expected), pace, self.sun, ~self.lost)
             self._look_back(stretch, expected, pace)
             off, rate = self._off(stretch, self.sun)
             astray = np.abs(stretch.since - expected) * pace > math.pi
             self.lost |= astray | (rate <= 0.0) | ~(np.abs(off) < 1e-6)
             self._number = self._number + step
             self.time = stretch.since
+            # From one Sun pulse to the next: seen one by one, each from the end of the last pulse
+            # on, they took steps of integration by the square of their number.
+            if np.all((stretch.since >= self.here.since) | self.lost):
+                self._latest = stretch
         return stretch
 
     def angle(self, here: MotionStretch) -> Array:

@@ -39,6 +39,7 @@ from nutdamp.planning.plan import Plan, Standing, judge
 from nutdamp.planning.screening import LIKELIER, FlownPlan, entered
 from nutdamp.planning.verdict import Cases, Verdict
 from nutdamp.schemes import planner
+from nutdamp.schemes.block_model import spin_turn
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL, SCHEMES, OptimalOptions, Options
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
@@ -448,8 +449,13 @@ def _alignments(
 
 def _others(spacecraft: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
     """Spacecraft for which the scheme plans differently: later, or without one of its channels."""
-    for periods in LATER:  # of the nutation as seen in the body, inertial ones for a sphere
-        earliest = spacecraft.limits.earliest + periods * spacecraft.nutation_period
+    # periods of the nutation as seen in the body, inertial ones for a sphere
+    periods = [share * spacecraft.nutation_period for share in LATER]
+    if SCHEMES[base.scheme].reads_commands:
+        # Blocks begin at Sun pulses, and starts within one turn ask the same question.
+        periods = [share * spin_turn(spacecraft) for share in LATER if share >= 1.0]
+    for period in periods:
+        earliest = spacecraft.limits.earliest + period
         if earliest < spacecraft.horizon:
             yield (
                 f"from {earliest:.4g} s on",

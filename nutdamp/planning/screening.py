@@ -29,7 +29,6 @@ from nutdamp.montecarlo.study import (
     Results,
     Study,
     affordable,
-    flown_in_stages,
     next_stage,
     study_of,
 )
@@ -55,7 +54,7 @@ class Dispersion(Dispersed):
 
 def verdict_of(plan: Plan) -> Verdict:
     """Judgement of a plan in as many dispersed cases as show its share, as ``nutdamp disperse``
-    flies them.
+    flies them; with nominal values where a comparison flies none.
     """
     if (
         not plan.feasible
@@ -63,8 +62,13 @@ def verdict_of(plan: Plan) -> Verdict:
         or not requirements.judged(plan.spacecraft)
     ):
         return judge(plan)
-    results = flown_in_stages(study_of(plan.spacecraft, plan.pulses))
-    return judge(plan, cases_of(results), results)
+    with suppress(Infeasible):
+        with work.budget("the dispersed cases", work.CASES):
+            candidate = entered(plan, None)
+        if candidate is not None:
+            candidate.finish(None)
+            return judge(plan, candidate.cases, candidate.results)
+    return judge(plan)
 
 
 LIKELIER = 0.01

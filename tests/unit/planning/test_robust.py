@@ -33,6 +33,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, Ground, compare, recommend
 from nutdamp.planning.verdict import Cases, Status, cases_of
 from nutdamp.schemes import four_pulse
+from nutdamp.schemes.block_model import spin_turn
 from nutdamp.schemes.catalogue import CLASSIC, Options
 from nutdamp.schemes.optimal.linear_program import ProgramColumns
 from nutdamp.spacecraft.model import Inertia, Limits, Requirement, Spacecraft
@@ -376,6 +377,25 @@ def test_of_plans_with_which_all_cases_comply_the_cheapest(shift: float, scheme:
     for other in found.candidates:
         if other.plan.pulses.cost < 0.999 * best(found).plan.pulses.cost:
             assert share(body, other.plan) < 0.99
+
+
+def test_later_starts_of_blocks_are_those_of_other_sun_pulses() -> None:
+    """Starts within one turn of the spin ask the same question."""
+    body = nutdamp.load(case("command-block-empty-widths.yaml"))
+    turn = spin_turn(body)
+    plan = planning.plan(body, "command-block")
+    labels = [label for label, _ in robust._others(body, plan) if label.startswith("from")]
+    assert labels == [f"from {body.limits.earliest + turns * turn:.4g} s on" for turns in (1, 2)]
+
+
+def test_a_plan_whose_cases_take_too_much_is_judged_alike_by_itself_and_beside_others() -> None:
+    body = nutdamp.example().with_(dispersions=ROUGH)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work, "CASES", 1.0)
+        compared = nutdamp.compare(body, ["two-pulse"])
+        plan = nutdamp.plan(body, scheme="two-pulse")
+        assert plan.verdict.cases is compared.verdict.cases is None
+        assert plan.verdict.status is compared.verdict.status
 
 
 ROUGH = {"A": {"normal": "0.5 %"}, "C": {"normal": "0.5 %"}}

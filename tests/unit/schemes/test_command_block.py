@@ -26,7 +26,7 @@ from nutdamp.flight import propagation
 from nutdamp.flight.cones import aspects
 from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.end_state import left_by
-from nutdamp.physics import attitude, precession
+from nutdamp.physics import attitude, motion, precession
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
@@ -551,6 +551,31 @@ def test_without_nutation_a_sun_pulse_comes_every_turn_and_in_no_view_none() -> 
     for key, body, count in cases:
         with refused(Infeasible, f"blocks.no-sun-pulse-{key}"):
             fired(body, (Block("+1", 1, 0.1, 0.1, count),))
+
+
+def test_sun_pulses_seen_one_by_one_are_those_seen_at_once_for_the_work_of_one_flight(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a body that is integrated; each from the end of the last pulse on took 30 times that."""
+    body = replace(
+        commanded(spinner(degrees=4.0, channels=cross(8.0)), SUN),
+        disturbances=(Disturbance(1e-3j),),
+    )
+    integrated = list[float]()
+    advance = motion.advance
+
+    def moved(stretch: motion.MotionStretch, duration: Any) -> None:
+        integrated.append(float(np.max(np.abs(duration))))
+        advance(stretch, duration)
+
+    monkeypatch.setattr(motion, "advance", moved)
+    whole, each = sun_clock(body), sun_clock(body)
+    (together,) = whole.sun_pulse(60).since
+    integrated.clear()
+    for number in range(1, 61):
+        (apart,) = each.sun_pulse(number).since
+    assert apart == pytest.approx(together, abs=1e-9)
+    assert sum(integrated) < 1.1 * apart
 
 
 @pytest.mark.parametrize("heading", [0.4, math.pi / 2, math.pi / 2 + 1e-7, 3.0, -2.0, 0.0])
