@@ -331,8 +331,8 @@ class SunPulseClock:
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3
     from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last computed Sun
     pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go round. ``over``
-    (n,) s: end of the last pulse, command and thrust. ``looked_back`` counts steps to Sun pulses
-    under thrust.
+    (n,) s: end of the last pulse, command and thrust. ``moves`` counts steps of Newton's method,
+    ``looked_back`` those of them to Sun pulses under thrust.
     """
 
     def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
@@ -345,7 +345,7 @@ class SunPulseClock:
         self._number = 0
         self.time = start.since + (ahead - CIRCLE) / self._pace
         self.lost = np.zeros(len(start.since), dtype=bool)
-        self._moves = self.looked_back = 0
+        self.moves = self.looked_back = 0
 
     @property
     def here(self) -> MotionStretch:
@@ -448,10 +448,10 @@ class SunPulseClock:
             cases = np.flatnonzero((sun_pulse.since < over.since) & ~self.lost)
             if not len(cases):
                 return
-            before = self._moves
+            before = self.moves
             start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
             again = self._root(start, pace[cases], self.sun[:, cases])
-            self.looked_back += self._moves - before
+            self.looked_back += self.moves - before
             for whole, part in zip(sun_pulse[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
@@ -484,7 +484,7 @@ class SunPulseClock:
             # mean rate.
             time = some.since + off / np.where(rate > 0.1 * pace[rows], rate, pace[rows])
             moved = some.moved(np.clip(time, earliest[rows], latest[rows]))
-            self._moves += 1
+            self.moves += 1
             pending[rows] &= (np.abs(off) >= CIRCLE * EXACT) & (moved.since != some.since)
             if few:
                 for whole, part in zip(here[1:4], moved[1:4], strict=True):

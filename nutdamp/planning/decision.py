@@ -440,13 +440,14 @@ class Comparison(results.Data, results.Tabled):
         try:
             for slow in (False, True):
                 for plan in self.plans:
-                    if (
-                        plan.scheme in catalogue.SCHEMES
-                        and catalogue.SCHEMES[plan.scheme].slow == slow
-                    ):
+                    scheme = catalogue.SCHEMES.get(plan.scheme)
+                    if scheme is None or scheme.slow != slow:
+                        continue
+                    if not scheme.on_true_body:  # which is planned with them in any case
                         aware = replace(plan.options, with_disturbances=True)
-                        others = (*others, attempt(spacecraft, plan.scheme, aware))
-                best = replace(self, plans=others, flown=None).recommended
+                        plan = attempt(spacecraft, plan.scheme, aware)
+                    others = (*others, plan)
+                best = replace(self, plans=others, flown=None, preferred=None).recommended
                 if best is not None and best.standing is Standing.COMPLIES:
                     break
         except NutdampError:

@@ -387,9 +387,9 @@ def _nearest(
         low = 0.0
         final = list[FlownPlan]()
         for candidate in sorted(candidates, key=lambda candidate: -candidate.cases.high):
-            if not final or candidate.cases.high >= low + LIKELIER:
-                with suppress(Infeasible):
-                    candidate.finish(work.SAMPLES)
+            with suppress(Infeasible):
+                candidate.finish(work.SAMPLES, low + LIKELIER if final else 0.0)
+                if candidate.final:
                     final.append(candidate)
                     low = max(low, candidate.cases.low)
         equals = [each.plan for each in final if _complying(each) >= low]

@@ -124,10 +124,10 @@ class FlownPlan:
         while not self.final and self.cases.enough is None and not work.exhausted():
             self.further(samples)
 
-    def finish(self, samples: int | None) -> None:
-        """Fly all stages, as of a plan that is shown."""
+    def finish(self, samples: int | None, above: float = 0.0) -> None:
+        """Fly all stages, as of a plan that is shown, while a share ``above`` that may comply."""
         self.final = False  # fewer may have been enough before
-        while not self.final:
+        while not self.final and self.cases.high >= above:
             self.further(samples)
 
 

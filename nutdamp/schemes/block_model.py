@@ -48,6 +48,12 @@ LOOKED_BACK = 2.0
 stage that is pushed for a turn and more took 5 s of which nothing was charged.
 """
 
+USUAL, MOVED = 8, 1.5
+"""Steps of Newton's method to a Sun pulse of flights that are integrated, beyond which each takes
+`work`, and units of it: where dissipation lets the nutation grow past 60 deg a search took 24 s of
+which 9 s were charged.
+"""
+
 FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 6.0
 """Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
 of a turn of theirs that is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
@@ -253,14 +259,17 @@ def fire_all(
     arcs = spacecraft.inertia.symmetric and not spacecraft.disturbances
     per_kg = shed(spacecraft)
     over, passed = np.zeros(count), np.zeros(count)
-    looked_back = 0
+    looked_back = moves = 0
     turn = spin_turn(spacecraft)
     for motion, flights in sun_pulses:
         turns = 1.0 if arcs else float(np.max(motion.since - passed)) / turn
         passed = motion.since
         back = LOOKED_BACK * (clock.looked_back - looked_back)
         looked_back = clock.looked_back
-        work.spend((STEPPED if arcs else INTEGRATED * turns) + FIRED * len(flights) + back)
+        more = 0.0 if arcs else MOVED * max(clock.moves - moves - USUAL, 0)
+        moves = clock.moves
+        stepped = STEPPED if arcs else INTEGRATED * turns + more
+        work.spend(stepped + FIRED * len(flights) + back)
         delays = motion.since * 0.0
         widths = np.zeros(count)
         given = dict[int, Pulse]()

@@ -47,8 +47,8 @@ from nutdamp.files.tabular import json_text
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import by_impulses
 from nutdamp.montecarlo.study import Results, run, study_of
+from nutdamp.planning import decision, tradeoff
 from nutdamp.planning import plan as planning
-from nutdamp.planning import tradeoff
 from nutdamp.planning.causes import hindrances, remaining
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons, verdict_notes
@@ -640,10 +640,29 @@ def test_planning_with_disturbances_is_tried_only_where_it_was_not_done() -> Non
     assert compare(FIRED, ("two-pulse",)).with_disturbances is None  # there are none
     assert compare(SHAKEN, ("two-pulse",)).with_disturbances is not None
     assert compare(SHAKEN, ("two-pulse",), AWARE).with_disturbances is None
+    compared = compare(SHAKEN, ("two-pulse",))
+    robust = replace(compared, preferred=compared["two-pulse"])
+    assert robust.with_disturbances not in (None, compared["two-pulse"])
     nothing_fits = replace(SHAKEN, limits=Limits(horizon=1e-6))
     assert (
         compare(nothing_fits, ("two-pulse",)).with_disturbances is None
     )  # and no recommended plan to compare with
+
+
+def test_schemes_that_know_the_disturbances_are_not_planned_again_with_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plans = [planning.plan(SHAKEN, name) for name in ("two-pulse", "command-block")]
+    planned = list[str]()
+
+    def attempted(_: Spacecraft, scheme: str, options: catalogue.SchemeOptions) -> planning.Plan:
+        assert options.with_disturbances
+        planned.append(scheme)
+        return plans[0]
+
+    monkeypatch.setattr(decision, "attempt", attempted)
+    assert decision.Comparison(SHAKEN, tuple(plans)).with_disturbances in plans
+    assert planned == ["two-pulse"]
 
 
 def noted_beside(
