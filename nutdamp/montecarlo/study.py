@@ -572,9 +572,14 @@ def run(
     return results
 
 
+def effort(study: Study, samples: int) -> float:
+    """Units of `work` of so many cases: of whole strides, which are flown together."""
+    return study.flies.effort * STRIDE * math.ceil(samples / STRIDE)
+
+
 def affordable(study: Study, samples: int) -> bool:
     """True if the open budget of work suffices for so many cases, which are flown at once."""
-    return study.flies.effort * samples <= work.left()
+    return effort(study, samples) <= work.left()
 
 
 def next_stage(
@@ -602,7 +607,7 @@ def next_stage(
         if begun.done and not affordable(study, stage - begun.done):
             return begun
         further = begun.extended(stage) if stage <= EXACT_CASES else Results(study, stage)
-        work.spend(study.flies.effort * (stage - begun.done))
+        work.spend(effort(study, stage - begun.done))
         if fly is None:
             run(further, threads=threads_here())
         else:

@@ -25,7 +25,17 @@ from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.statistics import cases_to_show
-from nutdamp.montecarlo.study import SEED, Results, Study, affordable, run, study_of, threads_here
+from nutdamp.montecarlo.study import (
+    SEED,
+    STRIDE,
+    Results,
+    Study,
+    affordable,
+    effort,
+    run,
+    study_of,
+    threads_here,
+)
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import planner, valve_commands
@@ -49,7 +59,7 @@ MOST_TOLERANCES, ALLOCATION_HALVINGS = 4, 6
 cases and enough.
 """
 
-CASES = (512, 2_048, 8_192)
+CASES = (STRIDE, 4 * STRIDE)
 """Stages of the drawn cases in which an allocation is tried, until it is certain whether enough
 comply: far too few are seen in the first.
 """
@@ -103,7 +113,7 @@ def _tightening(plan: Plan, given: Dispersions, probability: float) -> Tightenin
         for stage in stages:
             if results.done and not affordable(results.study, stage - results.done):
                 break
-            work.spend(results.study.flies.effort * (stage - results.done))
+            work.spend(effort(results.study, stage - results.done))
             results = run(results.extended(stage), threads=threads_here())
             if results.shown(certain=True) is not None:
                 break

@@ -20,6 +20,7 @@ from support.cases import deep
 from support.flights import flown_outputs
 from support.golden import check_text, refused
 
+from nutdamp.common import work
 from nutdamp.errors import BadRequest
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.dynamics import supplied
@@ -55,7 +56,18 @@ from nutdamp.montecarlo.statistics import (
     share_interval,
     vectors,
 )
-from nutdamp.montecarlo.study import EARLY, PORTION, Results, Study, flown_in_stages, run, study_of
+from nutdamp.montecarlo.study import (
+    EARLY,
+    PORTION,
+    STRIDE,
+    Results,
+    Study,
+    affordable,
+    effort,
+    flown_in_stages,
+    run,
+    study_of,
+)
 from nutdamp.physics.body import principal_axes
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
 from nutdamp.spacecraft.equipment import Channel, Steerable
@@ -170,8 +182,18 @@ def test_a_share_is_shown_beyond_its_interval_of_all_but_a_millionth_then_of_95_
         assert (results.shown(certain=True), results.shown()) == (early, last)
 
 
+def test_cases_cost_the_work_of_whole_strides() -> None:
+    study = a_study()
+    price = effort(study, 1)
+    assert price == effort(study, STRIDE) == pytest.approx(study.flies.effort * STRIDE)
+    assert effort(study, STRIDE + 1) == 2.0 * price
+    with work.budget("cases", 1.5 * price):
+        assert affordable(study, STRIDE)
+        assert not affordable(study, STRIDE + 1)
+
+
 @pytest.mark.parametrize(
-    ("samples", "share", "effort", "stages"),
+    ("samples", "share", "price", "stages"),
     [
         # Cases asked for, share of them that complies where 0.85 must, units a case; the stages
         # flown.
@@ -194,7 +216,7 @@ def test_a_share_is_shown_beyond_its_interval_of_all_but_a_millionth_then_of_95_
 def test_cases_are_flown_in_stages_until_the_share_is_shown(
     samples: int | None,
     share: float,
-    effort: float,
+    price: float,
     stages: list[int],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -202,7 +224,7 @@ def test_cases_are_flown_in_stages_until_the_share_is_shown(
         monkeypatch.setattr(dispersion, "EXACT_CASES", 50_000)
     study = a_study()
     seen = list[int]()
-    vars(study)["flies"] = SimpleNamespace(effort=effort)
+    vars(study)["flies"] = SimpleNamespace(effort=price)
 
     def fly(results: Results) -> None:
         results.done = results.requested
