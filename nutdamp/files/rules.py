@@ -111,6 +111,7 @@ RULES = (
     ("disturbances.*.rate", "not zero", "rate", "leave rate out for a torque fixed in the body"),
     ("disturbances.*.rate", "beside", ".kind=constant .kind=axial", TURNING),
     ("disturbances.*.fixed_in", "beside", ".kind=constant .kind=axial .rate", KEEP),
+    ("disturbances.*.from", "below", ".until", "time"),
     ("disturbances.*.kind=rotating", "needs", ".rate|.fixed_in", ", the rate seen in the body"),
     ("thrusters", "once", "name", "take another"),
     ("thrusters.*.name=steerable", "wrong", "", RESERVED),

@@ -15,12 +15,13 @@ from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.physics import motion
 from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial
+from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Timed
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
     BLOWDOWN,
     COLD,
     TRAVEL,
+    Disturbance,
     Inertia,
     Spacecraft,
     SpinState,
@@ -67,6 +68,22 @@ def joined(
         rows = owner == index
         rates[rows], quaternion[rows] = pieces[index][1](times[rows])
     return rates, quaternion
+
+
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """Path of ``parts`` one after the other, each from the time (s) beside it on."""
+
+    parts: Sequence[tuple[float, Path]]
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration."""
+        return sum(path.steps for _, path in self.parts)
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        return joined([(start, path.motion) for start, path in self.parts], times)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +212,7 @@ class Dynamics:
         return (
             self.moments[0] == self.moments[1]
             and not self.constant.any()
-            and not self.forcing.turning
+            and not self.forcing.drives
         )
 
     def path(
@@ -235,33 +252,43 @@ class Dynamics:
         work.spend(LEG)
         torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
-            _, growth, wheel, sense = self.forcing
-            arc = Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
+            arc = self._arc(start, state)
             return arc, state if end == start else arc.end(end)
-        torque = np.asarray(sum(torques, np.zeros(3)))
-        long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
-        if (
-            long
-            and falling is None
-            and slope is None
-            and not torque.any()
-            and not self.constant.any()
-            and self.forcing == Forcing()
-        ):
-            coast = FreeCoast(self.moments, start, state)
-            (rates,), (quaternion,) = coast.motion(np.array([end]))
-            work.spend(PULSE)
-            return coast, SpinState.of(rates, quaternion)
-        stretch = MotionStretch(
-            Bodies(np.array(self.moments), self.constant, self.forcing),
-            start,
-            state.rates,
-            state.quaternion,
-            torque,
-            slope,
-            falling,
-        )
-        pieces = tuple(motion.polynomials(stretch, end - start, most))
+        bodies = Bodies(np.array(self.moments), self.constant, self.forcing)
+        torque = np.sum(torques, axis=0) if torques else None
+        quaternion = state.quaternion.copy()
+        stretch = MotionStretch(bodies, start, state.rates, quaternion, torque, slope, falling)
+        parts = list[tuple[float, Path]]()
+        for part, length in motion.between_edges(stretch, end - start):
+            path, state = self._alike(part, state, length, most)
+            most -= path.steps
+            parts.append((float(part.since), path))
+            stretch.rates[:] = state.rates
+            quaternion[:] = state.quaternion
+        return parts[0][1] if len(parts) == 1 else Joined(parts), state
+
+    def _arc(self, start: float, state: SpinState) -> Arc:
+        _, growth, wheel, sense, _ = self.forcing
+        return Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
+
+    def _alike(
+        self, here: MotionStretch, state: SpinState, length: float, most: int
+    ) -> tuple[Path, SpinState]:
+        """Motion ``here`` under the same torques for ``length`` s, from ``state``."""
+        bodies = here.bodies
+        pushed = here.slope is not None or (here.torque is not None and bool(here.torque.any()))
+        start = float(here.since)
+        if not pushed and here.falling is None:
+            if bodies.free and here.torque is None:
+                arc = self._arc(start, state)
+                return arc, arc.end(start + length)
+            long = float(np.linalg.norm(state.rates)) * length > LONG
+            if long and not bodies.constant.any() and bodies.forcing == Forcing():
+                coast = FreeCoast(self.moments, start, state)
+                (rates,), (quaternion,) = coast.motion(np.array([start + length]))
+                work.spend(PULSE)
+                return coast, SpinState.of(rates, quaternion)
+        pieces = tuple(motion.polynomials(here, length, most))
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
         return Integrated(pieces), SpinState.of(*pieces[-1].end())
@@ -284,12 +311,24 @@ class Dynamics:
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
     """Dynamics of the true principal moments and disturbances."""
     disturbances = spacecraft.disturbances
-    fixed = sum(disturbance.transverse for disturbance in disturbances if disturbance.rate == 0.0)
-    turning = tuple((each.transverse, each.rate) for each in disturbances if each.rate != 0.0)
-    axial = math.fsum(disturbance.axial for disturbance in disturbances)
+    always = [each for each in disturbances if each.begin <= 0.0 and each.end == math.inf]
+    fixed = sum(each.transverse for each in always if each.rate == 0.0)
+    axial = math.fsum(each.axial for each in always)
+    timed = []
+    for each in disturbances:
+        if each not in always:
+            still = each.transverse if each.rate == 0.0 else 0j
+            constant = (still.real, still.imag, each.axial)
+            begin = each.begin if each.begin > 0.0 else -math.inf
+            timed.append(Timed(begin, each.end, constant, _turning([each])))
     wheel = spacecraft.inertia.wheel
-    forcing = Forcing(turning, spacecraft.growth, wheel, spacecraft.sense if wheel else 1.0)
+    sense = spacecraft.sense if wheel else 1.0
+    forcing = Forcing(_turning(always), spacecraft.growth, wheel, sense, tuple(timed))
     return Dynamics(spacecraft.inertia.moments, np.array([fixed.real, fixed.imag, axial]), forcing)
+
+
+def _turning(disturbances: Iterable[Disturbance]) -> tuple[tuple[complex, float], ...]:
+    return tuple((each.transverse, each.rate) for each in disturbances if each.rate != 0.0)
 
 
 def shed(spacecraft: Spacecraft) -> Vector | None:

@@ -12,6 +12,7 @@ Magnus 1970 (1) for three different moments and a wheel of momentum h, with the 
 from __future__ import annotations
 
 import cmath
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -28,6 +29,17 @@ LARGEST_ORDER = 30  # of a series; a step that has not converged by then is repe
 REMAINDER = 1e-15  # size of the last terms, relative to the scale of rates and quaternion
 
 
+class Timed(NamedTuple):
+    """Torques on bodies from ``begin`` to ``end`` s: ``constant`` (3) N m, ``turning`` as of
+    `Forcing`.
+    """
+
+    begin: float
+    end: float
+    constant: tuple[float, float, float]
+    turning: tuple[tuple[complex, float], ...] = ()
+
+
 class Forcing(NamedTuple):
     """Forcing of a body besides a constant torque."""
 
@@ -37,6 +49,18 @@ class Forcing(NamedTuple):
     growth: float = 0.0  # κ of `energy_sink`, 1/s, at which a small nutation grows; negative: decay
     wheel: Any = 0.0  # constant momentum h along axis 3 besides I3 ω3, N m s; (n,) of many bodies
     sense: float = 1.0  # σ of the spin axis σ·e3, where κ holds
+    timed: tuple[Timed, ...] = ()  # torques that begin or end, see `motion.between_edges`
+
+    @property
+    def drives(self) -> bool:
+        """True if torques act that are not constant."""
+        return bool(self.turning or self.timed)
+
+    @property
+    def edges(self) -> list[float]:
+        """Times, s, at which torques begin or end, in order."""
+        times = {edge for timed in self.timed for edge in (timed.begin, timed.end)}
+        return sorted(time for time in times if 0.0 < time < math.inf)
 
 
 NOTHING = Forcing()
@@ -72,8 +96,17 @@ class Bodies:
     @property
     def free(self) -> bool:
         """True if every coast is an arc of a symmetric body without external torque."""
-        alone = not self.constant.any() and not self.forcing.turning
-        return alone and self.symmetric
+        return not self.constant.any() and not self.forcing.drives and self.symmetric
+
+    def between(self, first: float, last: float) -> Bodies:
+        """Bodies as they are driven from ``first`` to ``last`` s, between two edges of their
+        forcing.
+        """
+        forcing = self.forcing
+        acting = [each for each in forcing.timed if each.begin <= first and last <= each.end]
+        constant = self.constant + np.sum([each.constant for each in acting], axis=0)
+        turning = sum((each.turning for each in acting), forcing.turning)
+        return replace(self, constant=constant, forcing=forcing._replace(turning=turning, timed=()))
 
     def momentum(self, rates: Array) -> Array:
         """Angular momentum (3, n) N m s in body axes at ``rates`` (3, n) rad/s."""

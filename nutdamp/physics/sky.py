@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from nutdamp.physics.attitude import angle_of_parts
 from nutdamp.physics.energy_sink import damper
-from nutdamp.physics.motion import MotionStretch, polynomials
+from nutdamp.physics.motion import MotionStretch, advance, between_edges, polynomials
 from nutdamp.physics.series import Polynomial
 
 Array = NDArray[np.float64]
@@ -115,7 +115,12 @@ class AxisWatch:
         """Record the motion that `motion.advance` makes with these arguments, which stay as they
         are.
         """
-        if here.torque is not None or not here.bodies.free:
+        if here.bodies.forcing.timed:
+            moving = here._replace(rates=here.rates.copy(), quaternion=here.quaternion.copy())
+            for part, length in between_edges(moving, duration):
+                self.motion(part, length)
+                advance(part, length)
+        elif here.torque is not None or not here.bodies.free:
             self._steps(here, duration)
         elif here.bodies.forcing.growth == 0.0:
             self._arc(here, duration)
@@ -123,9 +128,12 @@ class AxisWatch:
             self._slow(here, duration)
 
     def turn(self, here: MotionStretch) -> None:
-        """Record one turn of the axis about H in a motion free of pulses."""
+        """Record a motion free of pulses: one turn of the axis about H, behind the last edge of a
+        torque.
+        """
         first, second, _ = here.bodies.moments
-        self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
+        wait = np.maximum(max(here.bodies.forcing.edges, default=0.0) - here.since, 0.0)
+        self.motion(here, wait + CIRCLE * 0.5 * (first + second) / _momentum(here))
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
         np.minimum.at(self.least[number], self.rows[cases], least)  # a case may come twice

@@ -209,7 +209,7 @@ class Problem:
     @property
     def closed(self) -> bool:
         """True where nothing acts between pulses."""
-        alone = not self._dynamics.constant.any() and not self._dynamics.forcing.turning
+        alone = not self._dynamics.constant.any() and not self._dynamics.forcing.drives
         return alone and self.spacecraft.growth == 0.0
 
     def program(

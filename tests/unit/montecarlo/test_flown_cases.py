@@ -66,6 +66,11 @@ THREE = {
     ),
 }
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
+BURNS = (
+    Disturbance(1.0 + 0.5j, 0.05, begin=0.4, end=3.1),
+    Disturbance(0.3 + 0.0j, rate=-3.0, begin=2.0),
+    Disturbance(0.4j, -0.02, end=1.3),
+)
 LEAKING = DispersedModel(
     replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule
 )
@@ -184,6 +189,13 @@ def test_the_quadrature_of_wide_pulses_is_exact_to_rounding() -> None:
 FLOWN = {
     "steerable, oblate, spin reversed": STEERED,
     "disturbances, dissipation": LEAKING,
+    "disturbances with an end": DispersedModel(
+        replace(PROLATE.spacecraft, disturbances=BURNS), PROLATE.schedule
+    ),
+    "disturbances with an end, three moments, dissipation": DispersedModel(
+        replace(THREE["three moments"].spacecraft, disturbances=BURNS, dissipation=400.0),
+        PROLATE.schedule,
+    ),
     "prolate, dissipation": SYMMETRIC["prolate, dissipation"],
     "oblate, dissipation": dispersed.sinking(STEERED, 5.0),
     "despun, a wheel": SYMMETRIC["despun, a wheel"],
@@ -248,6 +260,9 @@ BLOCKS = {
     "three moments": by_blocks(spin=2.0, moments=(110.0, 98.0, 150.0)),
     "a wheel": dispersed.wheeled(by_blocks(spin=1.3), 60.0),
     "disturbances": by_blocks(disturbances=(Disturbance(0.02 + 0.01j, 0.03), LEAKS[1])),
+    "a disturbance with an end": by_blocks(
+        spin=1.3, disturbances=(Disturbance(0.3 + 0.1j, 0.03, begin=6.0, end=40.0),)
+    ),
 }
 
 
@@ -406,14 +421,19 @@ MODELS = {
     "dissipation": with_directions(dispersed.sinking(JETS)),
     "three moments": with_directions(dispersed.with_jets(moments=(120.0, 105.0, 80.0))),
     "disturbances": with_directions(JETS, disturbances=LEAKS, dissipation=400.0),
+    "disturbances with an end": with_directions(JETS, disturbances=BURNS),
+    "burn after the pulses": with_directions(
+        JETS, disturbances=(Disturbance(2.0 + 0.5j, begin=20.0, end=24.0),)
+    ),
     "blocks": with_directions(by_blocks()),
 }
 
 
 def end_of(made: propagation.Flight) -> float:
-    """When the axis has gone round H once more after the last pulse."""
+    """When the axis has gone round H once more after the last pulse and the last disturbance."""
     size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
-    return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size
+    last = max([made.schedule.end, *made.spacecraft.edges])
+    return last + math.pi * (made.moments[0] + made.moments[1]) / size
 
 
 def seen_in(model: DispersedModel, draws: dict[str, np.ndarray]) -> np.ndarray:
