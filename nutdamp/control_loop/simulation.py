@@ -279,7 +279,9 @@ def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
         return "a continuous signal"
     if spacecraft.disturbances:
         return "disturbances"
-    return "" if spacecraft.inertia.symmetric else "three different moments of inertia"
+    drawn = spacecraft.dispersions is not None and spacecraft.dispersions.inertia_tensor
+    alike = spacecraft.inertia.symmetric and not drawn
+    return "" if alike else "three different moments of inertia"
 
 
 def fly_alone(

@@ -311,7 +311,8 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     yield from _disturbance_edits(tree, before, carried.time)
     sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
     estimates = dict(zip(carried.names, carried.values.tolist(), strict=True))
-    for key in ("A", "C"):
+    drawn_alone = tree.get("dispersions", "inertia_tensor") is not None
+    for key in () if drawn_alone else ("A", "C"):
         if sigmas[key] > 0.0:
             yield Edit(
                 ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}"

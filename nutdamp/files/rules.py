@@ -160,6 +160,13 @@ RULES = (
     ),
     ("loop.faults.reversed", "once", "", "expected each channel once"),
     ("loop.faults.reversed.*", "named", "channel", ""),
+    ("dispersions.inertia_tensor", "beside", ".A .C", "keep the tensor, or A and C"),
+    (
+        "dispersions.inertia_tensor",
+        "beside",
+        "wheel",
+        "the wheel is along principal axis 3, which would move; give A and C instead",
+    ),
     ("dispersions.sensor_bias", "needs", "loop", SENSED),
     ("dispersions.sensor_bias.*", "sensed", "", ""),
     ("dispersions.sensor_scale", "needs", "loop", SENSED),

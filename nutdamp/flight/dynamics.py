@@ -15,13 +15,12 @@ from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.physics import motion
 from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Timed
+from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Torque, driven_by
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
     BLOWDOWN,
     COLD,
     TRAVEL,
-    Disturbance,
     Inertia,
     Spacecraft,
     SpinState,
@@ -209,11 +208,8 @@ class Dynamics:
         """True if coasts are arcs of a symmetric body without external torque, known in closed
         form.
         """
-        return (
-            self.moments[0] == self.moments[1]
-            and not self.constant.any()
-            and not self.forcing.drives
-        )
+        driven = self.constant.any() or self.forcing.turning or self.forcing.timed
+        return not driven and self.moments[0] == self.moments[1]
 
     def path(
         self,
@@ -310,25 +306,29 @@ class Dynamics:
 
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
     """Dynamics of the true principal moments and disturbances."""
-    disturbances = spacecraft.disturbances
-    always = [each for each in disturbances if each.begin <= 0.0 and each.end == math.inf]
-    fixed = sum(each.transverse for each in always if each.rate == 0.0)
-    axial = math.fsum(each.axial for each in always)
-    timed = []
-    for each in disturbances:
-        if each not in always:
-            still = each.transverse if each.rate == 0.0 else 0j
-            constant = (still.real, still.imag, each.axial)
-            begin = each.begin if each.begin > 0.0 else -math.inf
-            timed.append(Timed(begin, each.end, constant, _turning([each])))
     wheel = spacecraft.inertia.wheel
     sense = spacecraft.sense if wheel else 1.0
-    forcing = Forcing(_turning(always), spacecraft.growth, wheel, sense, tuple(timed))
-    return Dynamics(spacecraft.inertia.moments, np.array([fixed.real, fixed.imag, axial]), forcing)
+    forcing = Forcing((), spacecraft.growth, wheel, sense)
+    driven = forced(torques_of(spacecraft), forcing)
+    return Dynamics(spacecraft.inertia.moments, *driven)
 
 
-def _turning(disturbances: Iterable[Disturbance]) -> tuple[tuple[complex, float], ...]:
-    return tuple((each.transverse, each.rate) for each in disturbances if each.rate != 0.0)
+def torques_of(spacecraft: Spacecraft) -> list[Torque]:
+    """Torques of the disturbances in principal axes; one from t = 0 on acts before it too."""
+    torques = []
+    for each in spacecraft.disturbances:
+        vector = np.array([each.transverse.real, each.transverse.imag, each.axial])
+        begin = each.begin if each.begin > 0.0 else -math.inf
+        torques.append(Torque(vector, each.rate, begin, each.end))
+    return torques
+
+
+def forced(torques: Sequence[Torque], forcing: Forcing) -> tuple[Vector, Forcing]:
+    """Constant torque and forcing of bodies under ``torques``, and ``forcing`` without any."""
+    lasting = [each for each in torques if math.isinf(each.begin) and math.isinf(each.end)]
+    timed = tuple(each for each in torques if math.isfinite(each.begin) or math.isfinite(each.end))
+    constant = np.zeros(np.shape(torques[0].vector) if torques else 3)
+    return driven_by(lasting, constant, forcing._replace(timed=timed))
 
 
 def shed(spacecraft: Spacecraft) -> Vector | None:

@@ -77,7 +77,9 @@ class MotionStretch(NamedTuple):
     def acceleration(self) -> Array:
         """Constant part of the angular acceleration (3, n), rad/s²."""
         bodies = self.bodies
-        constant = bodies.constant if bodies.moments.ndim == 1 else bodies.constant[:, None]
+        constant = bodies.constant
+        if bodies.moments.ndim > 1:
+            constant = constant.reshape(3, -1)
         torque = constant if self.torque is None else constant + self.torque
         return np.asarray(torque / bodies.moments)
 

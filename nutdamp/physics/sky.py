@@ -284,9 +284,8 @@ def _torque(here: MotionStretch) -> Array:
         (size * np.exp(1j * rate * here.since) for size, rate in here.bodies.forcing.turning),
         0.0 * here.since,
     )
-    lasting = (
-        np.array([turning.real, turning.imag, 0.0 * here.since]) + here.bodies.constant[:, None]
-    )
+    lasting = np.array([turning.real, turning.imag, 0.0 * here.since])
+    lasting += here.bodies.constant.reshape(3, -1)
     return lasting if here.torque is None else lasting + here.torque
 
 
@@ -336,19 +335,22 @@ class TorqueRamp(NamedTuple):
 class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
-    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3
-    from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last computed Sun
-    pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go round. ``over``
-    (n,) s: end of the last pulse, command and thrust. ``looked_back`` counts steps to Sun pulses
-    under thrust.
+    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad, (n,) or one, is that of the sensor
+    about axis 3 from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last
+    computed Sun pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go
+    round. ``over`` (n,) s: end of the last pulse, command and thrust. ``looked_back`` counts steps
+    to Sun pulses under thrust.
     """
 
-    def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
-        self.sun, self.sense, self.azimuth = sun, sense, azimuth
+    def __init__(
+        self, start: MotionStretch, sun: Array, sense: float, azimuth: Array | float
+    ) -> None:
+        self.sun = np.vstack([sun, np.broadcast_to(azimuth, sun.shape[1])])
+        self.sense = sense
         self._stretches = [start]
         self._latest = start  # motion from which the next Sun pulse is looked for
         self.over = start.since
-        ahead, _ = self._ahead(start, sun)
+        ahead, _ = self._ahead(start, self.sun)
         # as if one had come before t = 0
         self._number = 0
         self.time = start.since + (ahead - CIRCLE) / self._pace
@@ -436,7 +438,7 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun))
+        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun[:3]))
 
     @property
     def _pace(self) -> Array:
@@ -510,7 +512,7 @@ class SunPulseClock:
 
     def _ahead(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
         """`_off` in [0, 2π)."""
-        return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
+        return ahead(here.rates, here.quaternion, sun[:3], sun[3], self.sense)
 
 
 def sun_direction(days: float) -> Array:
@@ -541,7 +543,7 @@ def sun_direction(days: float) -> Array:
 
 
 def ahead(
-    rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float
+    rates: Array, quaternion: Array, sun: Array, azimuth: Array | float, sense: float
 ) -> tuple[Array, Array]:
     """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its
     rate, rad/s.

@@ -489,17 +489,12 @@ class Spacecraft(results.Data, results.Shown):
         """
         gained: Any = 0.0
         turned: Any = 0.0
-        for disturbance in self.disturbances if self.axially_disturbed else ():
+        for disturbance in self.disturbances:
             begin, lasts = disturbance.within(start, end)
             more = disturbance.axial / self.inertia.C * lasts
             gained = gained + more
             turned = turned + more * (end - begin - 0.5 * lasts)
         return gained, turned
-
-    @property
-    def axially_disturbed(self) -> bool:
-        """True if a disturbance changes the spin."""
-        return any(disturbance.axial for disturbance in self.disturbances)
 
     @property
     def edges(self) -> list[float]:

@@ -243,7 +243,8 @@ def tolerance_table(spacecraft: Spacecraft) -> DataTable:
     """Differences allowed between true values and the file's; those of one size share a row."""
     alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
-        thrusters = alike.setdefault((entry.tolerance, entry.kind, size_text(entry)), [])
+        name = entry.name if entry.tolerance == "inertia_tensor" else entry.tolerance
+        thrusters = alike.setdefault((name, entry.kind, size_text(entry)), [])
         tolerance = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
         names = tolerance if isinstance(tolerance, Mapping) else ()
