@@ -336,7 +336,7 @@ def simulate(
     from nutdamp.planning.simulation import Simulation
 
     spacecraft, pulses = feasible(plan).spacecraft, plan.pulses
-    end = units.end_of_flight(pulses.end + spacecraft.inertial_period if until is None else until)
+    end = units.end_of_flight(spacecraft.watched_until(pulses.end) if until is None else until)
     drawn_to = shown_until(spacecraft, pulses) if until is None else end
     return Simulation(plan, end, flown, units.count("samples", samples, 2), drawn_to)
 

@@ -18,7 +18,7 @@ from nutdamp.common import work
 from nutdamp.control_loop.law import Actuator, ComplexArray, Firing, Law
 from nutdamp.control_loop.sensor import Doubt, Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
-from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
+from nutdamp.flight.dynamics import Dynamics, Joined, Path, Supply, shed, weakened
 from nutdamp.physics.motion import MOST_STEPS
 from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
@@ -140,24 +140,6 @@ class Watch:
         slack = 1e-12 * self.law.period
         begins = np.isnan(before) & (now >= -slack) & (now < max(ahead, slack))
         return np.asarray(falls | begins)
-
-
-@dataclass(frozen=True)
-class Joined:
-    """Path of ``parts`` one after the other, each from the time (s) beside it on."""
-
-    parts: list[tuple[float, Path]]
-    steps: int = 0
-
-    def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        owner = np.searchsorted([start for start, _ in self.parts], times, side="right") - 1
-        rates, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
-        for index, (_, path) in enumerate(self.parts):
-            rows = np.maximum(owner, 0) == index
-            if rows.any():
-                rates[rows], quaternion[rows] = path.motion(times[rows])
-        return rates, quaternion
 
 
 class Coast(Watch):

@@ -90,6 +90,9 @@ class LoopModel(DispersedModel):
         model = self.cases(draws)
         moments, wheels = rows(*model.moments).tolist(), rows(model.wheel)[:, 0].tolist()
         rates, tilts = rows(*model.omega0), rows(*model.tilt)
+        turns = np.broadcast_to(
+            np.eye(3)[..., None] if model.turn is None else model.turn, (3, 3, count)
+        )
         attitudes = None if spacecraft.attitude is None else self._attitudes(tilts)
         torques = {
             thruster.name: rows(*self.thruster_torque(thruster, draws))
@@ -109,13 +112,15 @@ class LoopModel(DispersedModel):
             key = (seed, number + 1)
             truth = replace(
                 spacecraft,
-                inertia=Inertia(triple(moments[row]), spacecraft.inertia.axes, wheels[row]),
+                inertia=Inertia(
+                    triple(moments[row]), spacecraft.inertia.axes @ turns[..., row], wheels[row]
+                ),
                 omega0=rates[row],
                 attitude=None if attitudes is None else Attitude(attitudes[row]),
                 channels=self._channels(
-                    draw, {name: torque[row] for name, torque in torques.items()}
+                    draw, {name: torque[row] for name, torque in torques.items()}, turns[..., row]
                 ),
-                loop=replace(loop, sensor=_sensor(loop.sensor, draw)),
+                loop=replace(loop, sensor=_sensor(loop.sensor, draw, turns[..., row])),
                 cold=cold_of(spacecraft, draw),
                 tank=tank_of(spacecraft, draw),
             )
@@ -137,11 +142,13 @@ class LoopModel(DispersedModel):
         turned = attitude.multiply(spacecraft.initial.quaternion, turns)
         return attitude.multiply(turned, attitude.from_matrix(spacecraft.inertia.axes.T))
 
-    def _channels(self, draw: dict[str, float], torques: dict[str, Vector]) -> tuple[Channel, ...]:
-        """Channels of a case; undispersed ones are those of the file."""
+    def _channels(
+        self, draw: dict[str, float], torques: dict[str, Vector], turn: Vector
+    ) -> tuple[Channel, ...]:
+        """Channels of a case, in its principal axes; undispersed ones are those of the file."""
         spacecraft = self.spacecraft
         names = {name.split()[1] for name in draw if name.split()[0] in OF_THRUSTERS}
-        if any(name.startswith("center of mass ") for name in draw):
+        if any(name.startswith(("center of mass ", "inertia ")) for name in draw):
             names = {
                 thruster.name for channel in spacecraft.channels for thruster in channel.thrusters
             }
@@ -154,9 +161,9 @@ class LoopModel(DispersedModel):
             thrusters = []
             for thruster in channel.thrusters:
                 factor = 1.0 + draw.get(f"thrust {thruster.name}", 0.0)
-                force = None if thruster.force is None else factor * thruster.force
+                force = None if thruster.force is None else factor * thruster.force @ turn
                 thrust = None if thruster.thrust is None else factor * thruster.thrust
-                torque = torques[thruster.name]
+                torque = torques[thruster.name] @ turn
                 thrusters.append(
                     replace(thruster, torque=torque, valve=valve, force=force, thrust=thrust)
                 )
@@ -217,12 +224,15 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
     )
 
 
-def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
+def _sensor(sensor: Sensor, draw: dict[str, float], turn: Vector) -> Sensor:
     axes = [""] if sensor.kind == ACCELEROMETER else [" 1", " 2"]
     scales = [sensor.scale * (1.0 + draw.get(f"sensor scale{axis}", 0.0)) for axis in axes]
     biases = [sensor.bias + draw.get(f"sensor bias{axis}", 0.0) for axis in axes]
     return replace(
         sensor,
+        position=sensor.position @ turn,
+        axis=sensor.axis @ turn,
+        axes=sensor.axes @ turn,
         scale=scales[0],
         bias=biases[0],
         noise=sensor.noise * (1.0 + draw.get("sensor noise", 0.0)),
@@ -358,14 +368,17 @@ class LoopStudy(DrawnCases):
         cases, pilots, spacecraft = flown.cases, flown.pilots, self.spacecraft
         before = np.array([case.truth.omega0 for case in cases]).T
         start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
-        momentum = tuple(carried(tuple(flown.quaternion), end))
+        axes = np.array([case.truth.inertia.axes for case in cases])
+        turns = spacecraft.inertia.axes.T @ axes
+        momentum = np.einsum("nij,jn->in", turns, carried(tuple(flown.quaternion), end))
+        start = triple(np.einsum("nij,jn->in", turns, start))
         tilts = np.array([case.tilt for case in cases]).T
         out = np.empty((len(OUTPUTS), len(cases)))
         out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
         out[1], out[2] = flown.quiet, flown.largest
-        out[3] = attitude.angle_of_parts(start, triple(np.array(momentum)))
+        out[3] = attitude.angle_of_parts(start, triple(momentum))
         out[4] = attitude.angle_of_parts(
-            triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1]))
+            triple(self.model.target.tolist()), rotated(triple(momentum), (tilts[0], tilts[1]))
         )
         out[5] = flown.rates[2] - before[2]
         used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]

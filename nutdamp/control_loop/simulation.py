@@ -26,7 +26,6 @@ from nutdamp.control_loop.controller import (
     Coast,
     Course,
     Ending,
-    Joined,
     Pilot,
     Scatter,
     Seen,
@@ -37,7 +36,7 @@ from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import Infeasible
 from nutdamp.flight import cones
-from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
+from nutdamp.flight.dynamics import Dynamics, Joined, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
 from nutdamp.physics import attitude, energy_sink
@@ -280,7 +279,9 @@ def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
         return "a continuous signal"
     if spacecraft.disturbances:
         return "disturbances"
-    return "" if spacecraft.inertia.symmetric else "three different moments of inertia"
+    drawn = spacecraft.dispersions is not None and spacecraft.dispersions.inertia_tensor
+    alike = spacecraft.inertia.symmetric and not drawn
+    return "" if alike else "three different moments of inertia"
 
 
 def fly_alone(
@@ -465,7 +466,7 @@ class Fleet:
     def _nutation(self, rows: Rows, since: Vector | float = 0.0) -> Vector:
         """θ (n,) rad of cases after a coast ``since`` (n,) s from now."""
         bodies = self.bodies.some(rows)
-        (A, _, C), (x, y, axial), (_, growth, wheel, sense) = (
+        (A, _, C), (x, y, axial), (_, growth, wheel, sense, _) = (
             bodies.moments,
             self.rates[:, rows],
             bodies.forcing,

@@ -39,7 +39,13 @@ from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, triaxial
 from nutdamp.physics.series import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
-from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState
+from nutdamp.spacecraft.model import (
+    Attitude,
+    Inertia,
+    Spacecraft,
+    SpinState,
+    disturbing_after,
+)
 from nutdamp.spacecraft.schedule import Schedule
 
 PREDICTION = 0.1  # units of `work` of a prediction, besides steps
@@ -288,7 +294,7 @@ class Model:
         about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
         disturbances = (
             replace(each, transverse=about * each.transverse)
-            for each in self.spacecraft.disturbances
+            for each in disturbing_after(self.spacecraft.disturbances, self.start)
         )
         spacecraft = replace(
             self.spacecraft,

@@ -456,8 +456,8 @@ def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[floa
         value for first, second, value in dispersions.correlation if {first, second} == {"A", "C"}
     )
     return (
-        prior_of(dispersions.A, inertia.A),
-        prior_of(dispersions.C, inertia.C),
+        prior_of(dispersions.A or dispersions.inertia_tensor, inertia.A),
+        prior_of(dispersions.C or dispersions.inertia_tensor, inertia.C),
         next(together, 0.0),
     )
 

@@ -329,7 +329,9 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         return np.array([body.inertia.nutation_rate(body.state.spin)])
 
     dispersions = spacecraft.dispersions or EXACT
-    of_A, of_C = _sigma_of(dispersions.A, inertia.A), _sigma_of(dispersions.C, inertia.C)
+    tensor = dispersions.inertia_tensor
+    of_A = _sigma_of(dispersions.A or tensor, inertia.A)
+    of_C = _sigma_of(dispersions.C or tensor, inertia.C)
     ratio = inertia.C / inertia.A
     both = ratio * math.hypot((of_A or 0.0) / inertia.A, (of_C or 0.0) / inertia.C) or None
     rows = (

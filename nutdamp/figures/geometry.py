@@ -43,11 +43,10 @@ def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
     then, or of a period as seen in the body where that is more. Without pulses, the inertial
     period.
     """
-    if not len(schedule):
+    last = max([schedule.end, *spacecraft.edges])
+    if not (len(schedule) or spacecraft.edges):
         return spacecraft.inertial_period
-    return schedule.end + min(
-        spacecraft.inertial_period, 0.25 * max(schedule.end, spacecraft.body_period)
-    )
+    return last + min(spacecraft.inertial_period, 0.25 * max(last, spacecraft.body_period))
 
 
 def drawn(flight: Flight, track: Track) -> Track:

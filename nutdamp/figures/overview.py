@@ -349,7 +349,7 @@ def until(flight: Flight) -> float:
     """End of the time axis of a flight, s: that of the flight where it was named, else
     `geometry.shown_until`.
     """
-    usual = flight.schedule.end + flight.spacecraft.inertial_period
+    usual = flight.spacecraft.watched_until(flight.schedule.end)
     return (
         flight.shown_to
         if flight.shown_to != usual

@@ -8,7 +8,7 @@ noted.
 
 from __future__ import annotations
 
-import cmath
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -47,7 +47,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft, disturbing_after
 from nutdamp.spacecraft.schedule import touching
 from nutdamp.units import parse
 
@@ -95,10 +95,7 @@ def later(flight: Flight, time: float) -> Later:
         center_of_mass=center,
         mass=None if before.mass is None else before.mass - used,
         tank=tank,
-        disturbances=tuple(
-            replace(each, transverse=each.transverse * cmath.exp(1j * each.rate * time))
-            for each in before.disturbances
-        ),
+        disturbances=disturbing_after(before.disturbances, time),
     )
     return Later(before, after, quaternions[0])
 
@@ -124,7 +121,7 @@ def carried_text(flight: Flight, time: float, source: object) -> str:
     moved_on = later(
         replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time
     )
-    return carry_text(*origin[:3], lambda tree: _edits(tree, moved_on))
+    return carry_text(*origin[:3], lambda tree: _edits(tree, moved_on, time))
 
 
 def carried_spacecraft(plan: Plan, time: float) -> Spacecraft:
@@ -151,7 +148,7 @@ def _limits_anew(spacecraft: Spacecraft, time: float) -> Iterator[Note]:
         yield note("limits-count-anew", at_s=time)
 
 
-def _edits(tree: Node, moved_on: Later) -> Edits:
+def _edits(tree: Node, moved_on: Later, time: float) -> Edits:
     before, after = moved_on.before, moved_on.after
     same = after.inertia.moments == before.inertia.moments
     yield from (
@@ -171,12 +168,31 @@ def _edits(tree: Node, moved_on: Later) -> Edits:
     ):
         yield Edit(("tank", "propellant"), float(after.tank.propellant), "mass")
         yield Edit(("tank", "pressure"), float(after.tank.pressure), "pressure")
-    for index, (old, new) in enumerate(zip(before.disturbances, after.disturbances, strict=True)):
-        torque = before.inertia.in_file(
-            np.array([new.transverse.real, new.transverse.imag, 0.0])
-        ).tolist()
-        for axis in range(2) if old.rate != 0.0 else ():
-            yield Edit(("disturbances", index, "torque", axis), torque[axis], "torque")
+    yield from _disturbance_edits(tree, before, time)
+
+
+def _disturbance_edits(tree: Node, spacecraft: Spacecraft, time: float) -> Edits:
+    """Torques turned on by ``time`` s, from and until counted from there, without those that are
+    over.
+    """
+    going = [index for index, each in enumerate(spacecraft.disturbances) if each.end > time]
+    if len(going) < len(spacecraft.disturbances):
+        nodes = (tree.get("disturbances", index) for index in going)
+        entries = [node.plain() for node in nodes if node is not None]
+        # A step further in, since the entries of a block may stand as far left as its key.
+        yield Edit(("disturbances",), " " + json.dumps(entries, ensure_ascii=False))
+    shifted = disturbing_after(spacecraft.disturbances, time)
+    for place, (index, new) in enumerate(zip(going, shifted, strict=True)):
+        edits = list[tuple[KeyPath, float, str]]()
+        if new.rate != 0.0:
+            across = np.array([new.transverse.real, new.transverse.imag, 0.0])
+            torque = spacecraft.inertia.in_file(across).tolist()
+            edits += [(("torque", axis), torque[axis], "torque") for axis in range(2)]
+        edits += [(("from",), new.begin, "time"), (("until",), new.end, "time")]
+        for path, value, kind in edits:
+            node = tree.get("disturbances", index, *path)
+            if node is not None:
+                yield Edit(("disturbances", place, *path), as_before(node, value, kind))
 
 
 SEEN = 3.0  # standard deviations from which on a growth of the nutation, or a delay, counts as seen
@@ -292,9 +308,11 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
             )
     if (bias := large.get(f"bias_{ACCELERATION}")) is not None:
         yield Edit(("loop", "sensor", "bias"), bias, "acceleration")
+    yield from _disturbance_edits(tree, before, carried.time)
     sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
     estimates = dict(zip(carried.names, carried.values.tolist(), strict=True))
-    for key in ("A", "C"):
+    drawn_alone = tree.get("dispersions", "inertia_tensor") is not None
+    for key in () if drawn_alone else ("A", "C"):
         if sigmas[key] > 0.0:
             yield Edit(
                 ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}"

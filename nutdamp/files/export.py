@@ -76,9 +76,11 @@ def _steps(plan: Plan, spacecraft: Spacecraft) -> Iterable[str]:
     impulse.
     """
     pulses, axes = plan.pulses, spacecraft.inertia.axes
-    longest = default_step(spacecraft, pulses, pulses.end)
-    edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})
-    for now, end in zip(edges, [*edges[1:], pulses.end], strict=True):
+    last = max([pulses.end, *spacecraft.edges])
+    longest = default_step(spacecraft, pulses, last)
+    firing_edges = (edge for pulse in pulses for edge in pulse.edges)
+    edges = sorted({0.0, last, *spacecraft.edges, *firing_edges})
+    for now, end in zip(edges, [*edges[1:], last], strict=True):
         for pulse in pulses:
             if pulse.torque is None and pulse.t == now:
                 yield f"({pulse.channel!r}, 0.0, {_vector(axes @ pulse.impulse)})"

@@ -140,14 +140,14 @@ class Section:
     @classmethod
     @cache
     def fields(cls) -> dict[str, Key]:
-        """Its keys, by name."""
+        """Its keys, by name; a word of Python has a line behind it in the class."""
         types = get_type_hints(cls, include_extras=True)
         keys = {}
         for name in types:
             key = getattr(cls, name, None)
             if isinstance(key, Key):
                 optional = key.default is REQUIRED and NoneType in get_args(types[name])
-                keys[name] = replace(
+                keys[name.removesuffix("_")] = replace(
                     key, type=types[name], default=None if optional else key.default
                 )
         return keys

@@ -935,6 +935,10 @@ class DisturbanceSection(Section):
     fixed_in: Literal["inertial"] | None = Field(
         "inertial: a rotating torque nearly fixed in space; its rate is minus the spin.", "inertial"
     )
+    from_: Time | None = Field("Time after t = 0 at which it begins, s; default 0.", "10 s")
+    until: PositiveTime | None = Field(
+        "Time after t = 0 at which it is over, s; default: it lasts.", "45 s"
+    )
 
 
 class DissipationSection(Section):

@@ -446,7 +446,9 @@ def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) 
         rate = entry.rate
     elif entry.kind == "rotating" or entry.fixed_in is not None:
         rate = -spin
-    return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
+    times = vars(entry)["from"] or 0.0, entry.until or math.inf
+    across, name = complex(torque[0], torque[1]), entry.name or ""
+    return Disturbance(across, float(torque[2]), rate, name, *times)
 
 
 def _attitude(

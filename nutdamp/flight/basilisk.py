@@ -88,6 +88,7 @@ def fly(
         raise Infeasible(f"the motion takes more than {MOST_STEPS} steps of Basilisk")
     hub = _Hub(spacecraft, longest)
     edges = {edge for pulse in schedule for edge in pulse.edges if 0.0 < edge < until}
+    edges |= {edge for edge in spacecraft.edges if edge < until}
     knots = sorted({0.0, until, *np.linspace(0.0, until, samples).tolist(), *edges})
     motion: list[tuple[Vector, Vector]] = []
     taken = 0.0
@@ -126,7 +127,8 @@ def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> fl
 def stretches(
     spacecraft: Spacecraft, schedule: Schedule, start: float, end: float, longest: float
 ) -> Iterator[tuple[float, Vector]]:
-    """Durations (s) and constant torques (3,) (N m) that make up a stretch between edges of pulses.
+    """Durations (s) and constant torques (3,) (N m) that make up a stretch between edges of pulses
+    and disturbances.
 
     One that turns, rises or falls becomes two constant ones an interval, mixed from its values at
     the Gauss nodes so that the mean and the first moment over time are kept: the commutator-free
@@ -137,11 +139,12 @@ def stretches(
     for torque, rise in filter(None, (pulse.push(start, end) for pulse in schedule)):
         constant += torque
         slope += 0.0 if rise is None else rise
-    for disturbance in spacecraft.disturbances:
+    acting = [each for each in spacecraft.disturbances if each.begin <= start and end <= each.end]
+    for disturbance in acting:
         constant[2] += disturbance.axial
         if disturbance.rate == 0.0:
             constant[:2] += (disturbance.transverse.real, disturbance.transverse.imag)
-    turning = [(each.transverse, each.rate) for each in spacecraft.disturbances if each.rate != 0.0]
+    turning = [(each.transverse, each.rate) for each in acting if each.rate != 0.0]
     if not turning and not slope.any():
         yield end - start, constant
         return

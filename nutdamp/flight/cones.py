@@ -66,7 +66,7 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     spacecraft = flown.spacecraft
     if not spacecraft.watched:
         return ()
-    end = flown.schedule.end + spacecraft.inertial_period if until is None else until
+    end = spacecraft.watched_until(flown.schedule.end) if until is None else until
     if flown.legs[-1].end < end:
         fly = (
             propagation.by_impulses if flown.model == propagation.IMPULSE_SUM else propagation.flown
@@ -101,7 +101,8 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
             int(np.argmax(nearness)),
             int(np.argmin(nearness)),
         ]  # before a jump, or at a kink of the angle from H
-        looked = np.concatenate([*tops, times[extremes]])
+        edges = [time for time in spacecraft.edges if time <= end]
+        looked = np.concatenate([*tops, edges, times[extremes]])
         angles = attitude.angle_between(*_axis_and_direction(flown, keep, looked[: -len(extremes)]))
         angles = np.concatenate([angles, attitude.angle_between(axis[extremes], towards[extremes])])
         near, far = int(np.argmin(angles)), int(np.argmax(angles))

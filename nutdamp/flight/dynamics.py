@@ -15,7 +15,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.physics import motion
 from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial
+from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Torque, driven_by
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
     BLOWDOWN,
@@ -67,6 +67,22 @@ def joined(
         rows = owner == index
         rates[rows], quaternion[rows] = pieces[index][1](times[rows])
     return rates, quaternion
+
+
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """Path of ``parts`` one after the other, each from the time (s) beside it on."""
+
+    parts: Sequence[tuple[float, Path]]
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration."""
+        return sum(path.steps for _, path in self.parts)
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        return joined([(start, path.motion) for start, path in self.parts], times)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,11 +208,8 @@ class Dynamics:
         """True if coasts are arcs of a symmetric body without external torque, known in closed
         form.
         """
-        return (
-            self.moments[0] == self.moments[1]
-            and not self.constant.any()
-            and not self.forcing.turning
-        )
+        driven = self.constant.any() or self.forcing.turning or self.forcing.timed
+        return not driven and self.moments[0] == self.moments[1]
 
     def path(
         self,
@@ -235,33 +248,43 @@ class Dynamics:
         work.spend(LEG)
         torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
-            _, growth, wheel, sense = self.forcing
-            arc = Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
+            arc = self._arc(start, state)
             return arc, state if end == start else arc.end(end)
-        torque = np.asarray(sum(torques, np.zeros(3)))
-        long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
-        if (
-            long
-            and falling is None
-            and slope is None
-            and not torque.any()
-            and not self.constant.any()
-            and self.forcing == Forcing()
-        ):
-            coast = FreeCoast(self.moments, start, state)
-            (rates,), (quaternion,) = coast.motion(np.array([end]))
-            work.spend(PULSE)
-            return coast, SpinState.of(rates, quaternion)
-        stretch = MotionStretch(
-            Bodies(np.array(self.moments), self.constant, self.forcing),
-            start,
-            state.rates,
-            state.quaternion,
-            torque,
-            slope,
-            falling,
-        )
-        pieces = tuple(motion.polynomials(stretch, end - start, most))
+        bodies = Bodies(np.array(self.moments), self.constant, self.forcing)
+        torque = np.sum(torques, axis=0) if torques else None
+        quaternion = state.quaternion.copy()
+        stretch = MotionStretch(bodies, start, state.rates, quaternion, torque, slope, falling)
+        parts = list[tuple[float, Path]]()
+        for part, length in motion.between_edges(stretch, end - start):
+            path, state = self._alike(part, state, length, most)
+            most -= path.steps
+            parts.append((float(part.since), path))
+            stretch.rates[:] = state.rates
+            quaternion[:] = state.quaternion
+        return parts[0][1] if len(parts) == 1 else Joined(parts), state
+
+    def _arc(self, start: float, state: SpinState) -> Arc:
+        _, growth, wheel, sense, _ = self.forcing
+        return Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
+
+    def _alike(
+        self, here: MotionStretch, state: SpinState, length: float, most: int
+    ) -> tuple[Path, SpinState]:
+        """Motion ``here`` under the same torques for ``length`` s, from ``state``."""
+        bodies = here.bodies
+        pushed = here.slope is not None or (here.torque is not None and bool(here.torque.any()))
+        start = float(here.since)
+        if not pushed and here.falling is None:
+            if bodies.free and here.torque is None:
+                arc = self._arc(start, state)
+                return arc, arc.end(start + length)
+            long = float(np.linalg.norm(state.rates)) * length > LONG
+            if long and not bodies.constant.any() and bodies.forcing == Forcing():
+                coast = FreeCoast(self.moments, start, state)
+                (rates,), (quaternion,) = coast.motion(np.array([start + length]))
+                work.spend(PULSE)
+                return coast, SpinState.of(rates, quaternion)
+        pieces = tuple(motion.polynomials(here, length, most))
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
         return Integrated(pieces), SpinState.of(*pieces[-1].end())
@@ -283,13 +306,29 @@ class Dynamics:
 
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
     """Dynamics of the true principal moments and disturbances."""
-    disturbances = spacecraft.disturbances
-    fixed = sum(disturbance.transverse for disturbance in disturbances if disturbance.rate == 0.0)
-    turning = tuple((each.transverse, each.rate) for each in disturbances if each.rate != 0.0)
-    axial = math.fsum(disturbance.axial for disturbance in disturbances)
     wheel = spacecraft.inertia.wheel
-    forcing = Forcing(turning, spacecraft.growth, wheel, spacecraft.sense if wheel else 1.0)
-    return Dynamics(spacecraft.inertia.moments, np.array([fixed.real, fixed.imag, axial]), forcing)
+    sense = spacecraft.sense if wheel else 1.0
+    forcing = Forcing((), spacecraft.growth, wheel, sense)
+    driven = forced(torques_of(spacecraft), forcing)
+    return Dynamics(spacecraft.inertia.moments, *driven)
+
+
+def torques_of(spacecraft: Spacecraft) -> list[Torque]:
+    """Torques of the disturbances in principal axes; one from t = 0 on acts before it too."""
+    torques = []
+    for each in spacecraft.disturbances:
+        vector = np.array([each.transverse.real, each.transverse.imag, each.axial])
+        begin = each.begin if each.begin > 0.0 else -math.inf
+        torques.append(Torque(vector, each.rate, begin, each.end))
+    return torques
+
+
+def forced(torques: Sequence[Torque], forcing: Forcing) -> tuple[Vector, Forcing]:
+    """Constant torque and forcing of bodies under ``torques``, and ``forcing`` without any."""
+    lasting = [each for each in torques if math.isinf(each.begin) and math.isinf(each.end)]
+    timed = tuple(each for each in torques if math.isfinite(each.begin) or math.isfinite(each.end))
+    constant = np.zeros(np.shape(torques[0].vector) if torques else 3)
+    return driven_by(lasting, constant, forcing._replace(timed=timed))
 
 
 def shed(spacecraft: Spacecraft) -> Vector | None:

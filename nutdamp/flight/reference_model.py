@@ -96,7 +96,13 @@ class ReferenceModel:
         )  # the rate in the body of what is nearly fixed in space
         pushes = document.disturbances
         self.pushes = [
-            (still if one.fixed_in else (one.rate or 0.0) * third, one.torque) for one in pushes
+            (
+                still if one.fixed_in else (one.rate or 0.0) * third,
+                one.torque,
+                vars(one)["from"] or -math.inf,
+                one.until or math.inf,
+            )
+            for one in pushes
         ]
 
     def _rates(self, state: Any) -> Array:
@@ -213,6 +219,7 @@ class ReferenceModel:
         jumps = np.concatenate(
             [[], *(each.shape[0] for each in (*self.burns, *self.kicks))]
         ).tolist()
+        jumps += [edge for push in self.pushes for edge in push[2:]]
         times = [start]
         pieces = list[Any]()
         for now, then in pairwise(
@@ -256,6 +263,8 @@ class ReferenceModel:
             if burn.shape[0, 0] < late and early < burn.shape[0, 3]
         ]
 
+        pushing = [push[:2] for push in self.pushes if push[2] < late and early < push[3]]
+
         def derivative(t: float, y: Array) -> Array:
             self.evaluations += 1
             if self.evaluations > self.most:
@@ -266,7 +275,7 @@ class ReferenceModel:
             for burn, first, last in firing:
                 level = first + (last - first) * (t - early) / (late - early)
                 torque += level * burn.supply(burn.full(t))[1] * burn.torque
-            for rate, push in self.pushes:
+            for rate, push in pushing:
                 torque += Rotation.from_rotvec(rate * t).apply(push)
             tensor = self._tensor_at(t)
             rates = y[:3]

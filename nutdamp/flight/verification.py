@@ -183,7 +183,7 @@ def verify(
     ``unrounded``: the schedule before its commands were rounded to ticks; ``expected``: planned
     with the disturbances.
     """
-    end = schedule.end + spacecraft.inertial_period
+    end = spacecraft.watched_until(schedule.end)
     judge = propagation.flown(spacecraft, schedule, end)
     times = np.unique(
         np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]])

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.flight.dynamics import Supply, shed
-from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, groups_of, list_inputs
+from nutdamp.montecarlo.inputs import BY_VALVE, TENSOR, Draws, Group, groups_of, list_inputs
 from nutdamp.physics import attitude
+from nutdamp.physics.body import DEGENERATE
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, possible, spread
 from nutdamp.spacecraft.equipment import Thruster
@@ -221,6 +222,21 @@ class DispersedCases:
     drained: Cases = 0.0  # as of `supplied`
     per_kg: Triple | None = None  # decrease of the moments by each kg, m²; None where they stay
     wheel: Cases = 0.0  # h, N m s
+    turn: Any = None  # (3, 3, n): columns are their principal axes, by those of the estimate
+
+    def of_estimate(self, vector: Triple) -> Triple:
+        """A vector in the principal axes of the estimate from the cases' own."""
+        return vector if self.turn is None else _rows_times(self.turn, vector)
+
+    def untwisted(self, vector: Triple) -> Triple:
+        """A vector in the cases' own axes, turned about the third to where the first is nearest to
+        that of the estimate: small changes of equal moments turn axes by any angle.
+        """
+        if self.turn is None:
+            return vector
+        x, y, z = vector
+        cosine, sine = self.turn[:2, 0] / np.sqrt(np.sum(self.turn[:2, 0] ** 2, axis=0))
+        return x * cosine - y * sine, x * sine + y * cosine, z
 
     @property
     def propellant(self) -> Cases | None:
@@ -314,8 +330,9 @@ class DispersedModel:
         """True where a case is possible: moments of a rigid body, positive thrust, a sensor that
         sees something.
         """
-        moments = self._moments(draws)
-        good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
+        moments, turn = self._body(draws)
+        dispersed = "A" in draws or "C" in draws or turn is not None
+        good: Any = _possible(*moments) if dispersed else True
         for entry in self.inputs.drawn:
             if entry.tolerance in NOT_NEGATIVE + POSITIVE and entry.name in draws:
                 value = entry.nominal + draws[entry.name]
@@ -339,7 +356,13 @@ class DispersedModel:
 
     def cases(self, draws: Draws) -> DispersedCases:
         """Cases of the ``draws`` (deviations by input name)."""
-        turn = self.spacecraft.inertia.axes
+        axes = self.spacecraft.inertia.axes
+        moments, turn = self._body(draws)
+
+        def own(vector: Triple) -> Triple:
+            """In the principal axes of the cases."""
+            return vector if turn is None else _rows_times(np.swapaxes(turn, 0, 1), vector)
+
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
         torques = {
             source: self._torque(source, draws)
@@ -354,14 +377,14 @@ class DispersedModel:
         )
         levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
         return DispersedCases(
-            moments=self._moments(draws),
-            omega0=added(parts_of(self.spacecraft.omega0), turned(turn.T, off)),
+            moments=moments,
+            omega0=own(added(parts_of(self.spacecraft.omega0), turned(axes.T, off))),
             starts=starts,
             widths=widths,
             leads=leads,
-            impulses=tuple(map(scaled, impulses, levels)),
+            impulses=tuple(own(part) for part in map(scaled, impulses, levels)),
             thrust=tuple(
-                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in thrust)
+                tuple(Thrusting(each.opened, own(scaled(each.torque, level))) for each in thrust)
                 for thrust, level in zip(thrusts, levels, strict=True)
             ),
             tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
@@ -369,6 +392,7 @@ class DispersedModel:
             drained=drained,
             per_kg=self._per_kg(draws),
             wheel=plus(self.spacecraft.inertia.wheel, draws.get("wheel momentum", 0.0)),
+            turn=turn,
         )
 
     def _fired(
@@ -406,17 +430,25 @@ class DispersedModel:
         begins = plus(start if nothing(shift) else _not_before(start + shift), lead)
         return begins, width, lead, scaled(impulse, factor), tuple(thrust), flow * factor
 
-    def _moments(self, draws: Draws) -> Triple:
-        """Moments: the draw of A scales both transverse moments, C is the axial one."""
+    def _body(self, draws: Draws) -> tuple[Triple, Any]:
+        """Principal moments, and their axes where a tensor is drawn, else None; the draw of A
+        scales both transverse moments, C is the axial one.
+        """
         inertia = self.spacecraft.inertia
+        if entries := [name for name in TENSOR if name in draws]:
+            count = max(np.size(draws[name]) for name in entries)
+            change = np.zeros((3, 3, count), dtype=np.result_type(*(draws[n] for n in entries)))
+            for name in entries:
+                row, column = TENSOR[name]
+                change[row, column] = change[column, row] = draws[name]
+            turned_back = np.einsum("ki,kln,lj->nij", inertia.axes, change, inertia.axes)
+            values, turn = principal(np.diag(inertia.moments), turned_back)
+            return triple(values.T), np.moveaxis(turn, 0, -1)
         first, second, third = inertia.moments
         transverse = plus(1.0, times(draws.get("A", 0.0), 1.0 / inertia.A))
         wider = first * transverse
-        return (
-            wider,
-            wider if first == second else second * transverse,
-            plus(third, draws.get("C", 0.0)),
-        )
+        other = wider if first == second else second * transverse
+        return (wider, other, plus(third, draws.get("C", 0.0))), None
 
     def _actuation(self, pulse: Pulse) -> _Actuation:
         thrusters = self._members.get(pulse.channel)
@@ -530,14 +562,49 @@ def _not_before(start: Cases) -> Cases:
     return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
 
 
-def watch_over(spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int) -> AxisWatch:
-    """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and
-    2.
+def principal(tensor: Vector, change: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Moments (n, 3) of a ``tensor`` (3, 3) with changes (n, 3, 3), and the turns (n, 3, 3) whose
+    columns are the axes: right-handed, the third the nearest to the third, then the first.
+
+    An imaginary part is a change to first order; of equal moments it turns no axis.
+    """
+    values, vectors = np.linalg.eigh(tensor + change.real)
+    rows = np.arange(len(values))
+    nearness = np.abs(vectors)
+    third = np.argmax(nearness[:, 2], axis=1)
+    nearness[rows, 0, third] = -1.0
+    first = np.argmax(nearness[:, 0], axis=1)
+    values = np.stack([values[rows, each] for each in (first, 3 - first - third, third)], axis=1)
+    along, last = vectors[rows, :, first], vectors[rows, :, third]
+    along = along * np.where(along[:, :1] < 0.0, -1.0, 1.0)
+    last = last * np.where(last[:, 2:] < 0.0, -1.0, 1.0)
+    turn = np.stack([along, np.cross(last, along), last], axis=2)
+    if not np.iscomplexobj(change):
+        return values, turn
+    slight = np.swapaxes(turn, 1, 2) @ change.imag @ turn
+    apart = values[:, None, :] - values[:, :, None]
+    equal = np.abs(apart) <= DEGENERATE * values.max(axis=1)[:, None, None]
+    lean = slight / np.where(equal, np.inf, apart)
+    return values + 1j * np.diagonal(slight, axis1=1, axis2=2), turn + 1j * turn @ lean
+
+
+def _rows_times(matrix: Any, vector: Sequence[Cases]) -> Triple:
+    """Matrices (3, 3, n) times vectors, elementwise over cases."""
+    return triple(reduce(plus, map(times, row, vector)) for row in matrix)
+
+
+def watch_over(
+    spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int, turn: Any = None
+) -> AxisWatch:
+    """Observer of ``count`` cases with axes off by a ``tilt``, rad, about 1 and 2, and by the
+    ``turn`` of `DispersedCases`.
     """
     inertial = [
         np.zeros(3) if cone.direction is None else cone.direction for cone in spacecraft.keep
     ]
-    directions = np.array([in_body(spacecraft, tilt, count, direction) for direction in inertial])
+    directions = np.array(
+        [in_body(spacecraft, tilt, count, direction, turn) for direction in inertial]
+    )
     momentum = next(
         (number for number, cone in enumerate(spacecraft.keep) if cone.direction is None), None
     )
@@ -545,15 +612,15 @@ def watch_over(spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int) -> Axi
 
 
 def in_body(
-    spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector
+    spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector, turn: Any = None
 ) -> NDArray[np.float64]:
-    """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3,
-    n).
+    """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt`` and a
+    ``turn``, (3, n).
     """
     x, y, z = attitude.rotate(attitude.conjugate(spacecraft.initial.quaternion), direction).tolist()
-    return np.array(
-        [np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))]
-    )
+    seen = rotated((x, y, z), (-tilt[0], -tilt[1]))
+    own = seen if turn is None else _rows_times(np.swapaxes(turn, 0, 1), seen)
+    return np.array([np.broadcast_to(part, count) for part in own])
 
 
 def number_of(cases: DispersedCases) -> int:

@@ -16,6 +16,7 @@ import hashlib
 import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -39,6 +40,13 @@ SPREAD = {
 
 BY_VALVE = ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit")
 """Tolerances of a valve, or in the last place of a table."""
+
+TENSOR = {
+    f"inertia {'xyz'[row]}{'xyz'[column]}": (row, column)
+    for row in range(3)
+    for column in range(row, 3)
+}
+"""Inputs of the inertia tensor, and the row and column of each."""
 
 KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
 
@@ -168,6 +176,13 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
         return
     yield _Row("A", requested.A, ["A"], inertia.A, "kg m²")
     yield _Row("C", requested.C, ["C"], inertia.C, "kg m²")
+    tensor, spread = inertia.tensor, requested.inertia_tensor
+    for name, (row, column) in TENSOR.items():
+        size = math.sqrt(tensor[row, row] * tensor[column, column])
+        entry = spread and replace(
+            spread, size=spread.size * (size if spread.relative else 1.0), relative=False
+        )
+        yield _Row("inertia_tensor", entry, [name], float(tensor[row, column]), "kg m²")
     yield _Row(
         "wheel_momentum", requested.wheel_momentum, ["wheel momentum"], inertia.wheel, "N m s"
     )

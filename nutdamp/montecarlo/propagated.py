@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import TINY, cos_sin, gauss_legendre
 from nutdamp.errors import Infeasible
-from nutdamp.flight.dynamics import make_dynamics
+from nutdamp.flight.dynamics import forced, make_dynamics, torques_of
 from nutdamp.montecarlo.cases import (
     Cases,
     DispersedCases,
@@ -38,6 +38,7 @@ from nutdamp.montecarlo.cases import (
     triple,
     watch_over,
 )
+from nutdamp.montecarlo.inputs import TENSOR
 from nutdamp.physics import motion, sky
 from nutdamp.physics.motion import MotionStretch, advance
 from nutdamp.physics.series import Bodies, Forcing
@@ -127,10 +128,10 @@ class ClosedForm:
             spin = spin + gained / C
             A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
         momentum = A * x, A * y, plus(C * spin, wheel)
-        after = carried(turn, momentum)
+        after = cases.of_estimate(carried(turn, momentum))
         return Ends(
-            momentum=momentum,
-            before=before,
+            momentum=cases.untwisted(momentum),
+            before=cases.of_estimate(before),
             after=after,
             pointed=rotated(after, cases.tilt),
             spin=spin,
@@ -147,7 +148,8 @@ class ClosedForm:
         C = spacecraft.inertia.C
         spin = abs(spacecraft.spin)
         off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
-        off_A, off_C = off.get("A", 0.0), off.get("C", 0.0)
+        tensor = max(off.get(name, 0.0) for name in TENSOR)
+        off_A, off_C = off.get("A", tensor), off.get("C", tensor)
         ratio = max(
             abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A))
         )
@@ -276,7 +278,12 @@ def fly(
     over = np.zeros(count)
     rates = rates.copy()
     quaternion = quaternion.copy()
-    sun = in_body(spacecraft, cases.tilt, count, spacecraft.sun)
+    sun = in_body(spacecraft, cases.tilt, count, spacecraft.sun, cases.turn)
+    azimuth = np.full(count, spacecraft.sun_sensor.azimuth)
+    if cases.turn is not None:
+        towards = np.array([np.cos(azimuth), np.sin(azimuth)])
+        first, second = (np.sum(cases.turn[:2, axis] * towards, axis=0) for axis in (0, 1))
+        azimuth = np.arctan2(second, first)
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
     pulses = model.schedule.pulses
     begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
@@ -291,7 +298,7 @@ def fly(
             bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows]
         )
         clock = SunPulseClock(
-            start, sun[:, rows], math.copysign(1.0, spacecraft.spin), spacecraft.sun_sensor.azimuth
+            start, sun[:, rows], math.copysign(1.0, spacecraft.spin), azimuth[rows]
         )
         commanded = (
             (block, number) for block in model.schedule.blocks for number in block.sun_pulses
@@ -421,10 +428,12 @@ class RealWidths:
         count = number_of(cases)
         spacecraft = self.model.spacecraft
         sheds = None
-        watch = watch_over(spacecraft, cases.tilt, count) if spacecraft.keep else None
+        watch = None
+        if spacecraft.keep:
+            watch = watch_over(spacecraft, cases.tilt, count, cases.turn)
         rates = _whole(cases.omega0, count)
         propellant = cases.propellant
-        bodies = self._bodies(_whole(cases.moments, count), cases.wheel)
+        bodies = self._bodies(_whole(cases.moments, count), cases.wheel, cases.turn)
         upright = np.eye(4, 1).repeat(
             count, axis=1
         )  # the true body axes at t = 0 are where everything is seen from
@@ -457,13 +466,13 @@ class RealWidths:
         if watch is not None:
             watch.turn(MotionStretch(last, over, settled, turned))
         momentum = triple(last.momentum(settled))
-        after = carried(tuple(turned), momentum)
+        after = cases.of_estimate(carried(tuple(turned), momentum))
         nutation = None
         if not np.array_equal(last.moments[0], last.moments[1]):
             nutation = widest_cones(last.moments, settled, spacecraft.sense, last.forcing.wheel)[0]
         return Ends(
-            momentum=momentum,
-            before=triple(bodies.momentum(rates)),
+            momentum=cases.untwisted(momentum),
+            before=cases.of_estimate(triple(bodies.momentum(rates))),
             after=after,
             pointed=rotated(after, cases.tilt),
             spin=settled[2],
@@ -474,10 +483,14 @@ class RealWidths:
             drained=cases.drained,
         )
 
-    def _bodies(self, moments: Array, wheel: Cases) -> Bodies:
-        return Bodies(
-            moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel)
-        )
+    def _bodies(self, moments: Array, wheel: Cases, turn: Any = None) -> Bodies:
+        torques = torques_of(self.model.spacecraft)
+        if turn is not None:
+            axes = np.broadcast_to(turn, (3, *moments.shape))
+            own = (np.einsum("ijn,i->jn", axes, each.vector) for each in torques)
+            torques = [each._replace(vector=one) for each, one in zip(torques, own, strict=True)]
+        forcing = self._dynamics.forcing._replace(wheel=wheel, turning=())
+        return Bodies(moments, *forced(torques, forcing))
 
     def _ramps(
         self, cases: DispersedCases, starts: Array, impulses: Array, sheds: Array | None

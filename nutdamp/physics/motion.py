@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -76,7 +77,9 @@ class MotionStretch(NamedTuple):
     def acceleration(self) -> Array:
         """Constant part of the angular acceleration (3, n), rad/s²."""
         bodies = self.bodies
-        constant = bodies.constant if bodies.moments.ndim == 1 else bodies.constant[:, None]
+        constant = bodies.constant
+        if bodies.moments.ndim > 1:
+            constant = constant.reshape(3, -1)
         torque = constant if self.torque is None else constant + self.torque
         return np.asarray(torque / bodies.moments)
 
@@ -132,7 +135,7 @@ def nutated(
     Without dissipation the rates stay in that frame; with it they and the frame slip as in
     `energy_sink`. Real or complex: a complex step gives derivatives.
     """
-    _, growth, wheel, sense = forcing
+    _, growth, wheel, sense, _ = forcing
     number = isinstance(time, float)
     sqrt: Any = math.sqrt if number else np.sqrt
     turn: Any = _cos_sin if number else cos_sin
@@ -161,10 +164,37 @@ def _cos_sin(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
+def between_edges(here: MotionStretch, duration: Any) -> Iterator[tuple[MotionStretch, Any]]:
+    """Parts of a motion over ``duration`` (n,) s, positive or negative, in which the same torques
+    act, and the duration of each, which is 0 for cases that move in others.
+
+    All hold the arrays of ``here``: move these on before the next part is taken.
+    """
+    if not here.bodies.forcing.timed:
+        yield here, duration
+        return
+    start, goal = here.since, here.since + duration
+    spans = list(pairwise([-math.inf, *here.bodies.forcing.edges, math.inf]))
+    for ordered, onward in ((spans, np.maximum), (spans[::-1], np.minimum)):
+        for first, last in ordered:
+            begin = np.clip(start, first, last)
+            length = onward(np.clip(goal, first, last) - begin, 0.0)
+            if np.any(length):
+                part = here.later(begin - start, here.rates, here.quaternion)
+                bodies = part.bodies.between(first, last)
+                yield part._replace(since=begin, bodies=bodies), length
+
+
 def advance(here: MotionStretch, duration: Any) -> None:
     """Propagate rates and quaternions by ``duration`` (n,) s, in place."""
     if not np.any(duration):
         return
+    for part, length in between_edges(here, duration):
+        _advance(part, length)
+
+
+def _advance(here: MotionStretch, duration: Any) -> None:
+    """`advance` under the same torques."""
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     if here.torque is None and bodies.free and here.falling is None:
         A, _, C = bodies.moments
@@ -187,7 +217,7 @@ def _steady(here: MotionStretch) -> bool:
 
 
 def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> Iterator[Polynomial]:
-    """Motion over ``duration`` (n,) s in pieces, one after the other.
+    """Motion under the same torques over ``duration`` (n,) s in pieces, one after the other.
 
     Raises Infeasible beyond `LONGEST` rad or ``most`` steps.
     """

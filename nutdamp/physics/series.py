@@ -12,6 +12,8 @@ Magnus 1970 (1) for three different moments and a wheel of momentum h, with the 
 from __future__ import annotations
 
 import cmath
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -28,18 +30,49 @@ LARGEST_ORDER = 30  # of a series; a step that has not converged by then is repe
 REMAINDER = 1e-15  # size of the last terms, relative to the scale of rates and quaternion
 
 
+class Torque(NamedTuple):
+    """Torque from ``begin`` to ``end`` s: a ``vector`` (3,) N m, or (3, n) of many bodies, that
+    turns about axis 3 at ``rate`` rad/s from t = 0.
+    """
+
+    vector: Array
+    rate: float = 0.0
+    begin: float = -math.inf
+    end: float = math.inf
+
+
 class Forcing(NamedTuple):
     """Forcing of a body besides a constant torque."""
 
     turning: tuple[
-        tuple[complex, float], ...
+        tuple[Any, float], ...
     ] = ()  # torques M e^{irt} about axis 3: M1 + iM2 in N m at t = 0, r rad/s
     growth: float = 0.0  # κ of `energy_sink`, 1/s, at which a small nutation grows; negative: decay
     wheel: Any = 0.0  # constant momentum h along axis 3 besides I3 ω3, N m s; (n,) of many bodies
     sense: float = 1.0  # σ of the spin axis σ·e3, where κ holds
+    timed: tuple[Torque, ...] = ()  # those that begin or end, see `motion.between_edges`
+
+    @property
+    def edges(self) -> list[float]:
+        """Times, s, at which torques begin or end, in order."""
+        times = {edge for torque in self.timed for edge in (torque.begin, torque.end)}
+        return sorted(time for time in times if 0.0 < time < math.inf)
 
 
 NOTHING = Forcing()
+
+
+def driven_by(
+    torques: Sequence[Torque], constant: Array, forcing: Forcing
+) -> tuple[Array, Forcing]:
+    """Constant torque and forcing of bodies on which ``torques`` act too."""
+    turning = forcing.turning
+    for vector, rate, *_ in torques:
+        if rate != 0.0:
+            turning = (*turning, (vector[0] + 1j * vector[1], rate))
+            vector = np.stack([0.0 * vector[0], 0.0 * vector[1], vector[2]])
+        constant = constant + vector
+    return constant, forcing._replace(turning=turning)
 
 
 class Falling(NamedTuple):
@@ -57,7 +90,7 @@ class Falling(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Bodies:
     """Bodies with principal ``moments`` (3, n) kg m², or (3,) of one; ``constant`` torque (3,) N m
-    and ``forcing`` act on all.
+    and ``forcing`` act on all, or (3, n) and sizes (n,) on each.
     """
 
     moments: Array
@@ -72,8 +105,17 @@ class Bodies:
     @property
     def free(self) -> bool:
         """True if every coast is an arc of a symmetric body without external torque."""
-        alone = not self.constant.any() and not self.forcing.turning
-        return alone and self.symmetric
+        driven = self.constant.any() or self.forcing.turning or self.forcing.timed
+        return not driven and self.symmetric
+
+    def between(self, first: float, last: float) -> Bodies:
+        """Bodies as they are driven from ``first`` to ``last`` s, between two edges of their
+        forcing.
+        """
+        timed = self.forcing.timed
+        acting = [each for each in timed if each.begin <= first and last <= each.end]
+        driven = driven_by(acting, self.constant, self.forcing._replace(timed=()))
+        return Bodies(self.moments, *driven)
 
     def momentum(self, rates: Array) -> Array:
         """Angular momentum (3, n) N m s in body axes at ``rates`` (3, n) rad/s."""
@@ -83,10 +125,17 @@ class Bodies:
 
     def some(self, cases: Any) -> Bodies:
         """Subset of ``cases`` (an index of arrays)."""
-        forcing = self.forcing
-        if np.ndim(forcing.wheel):
-            forcing = forcing._replace(wheel=forcing.wheel[cases])
-        return Bodies(self.moments[:, cases], self.constant, forcing)
+
+        def part(values: Any, own: int) -> Any:
+            return values[..., cases] if np.ndim(values) == own else values
+
+        wheel, turning, timed = self.forcing.wheel, self.forcing.turning, self.forcing.timed
+        forcing = self.forcing._replace(
+            wheel=part(wheel, 1),
+            turning=tuple((part(size, 1), rate) for size, rate in turning),
+            timed=tuple(each._replace(vector=part(each.vector, 2)) for each in timed),
+        )
+        return Bodies(self.moments[:, cases], part(self.constant, 2), forcing)
 
     def lighter(self, by: Array | None) -> Bodies:
         """Copy with moments smaller ``by`` (3, n) kg m²; None: unchanged."""

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from nutdamp.physics.attitude import angle_of_parts
 from nutdamp.physics.energy_sink import damper
-from nutdamp.physics.motion import MotionStretch, polynomials
+from nutdamp.physics.motion import MotionStretch, advance, between_edges, polynomials
 from nutdamp.physics.series import Polynomial
 
 Array = NDArray[np.float64]
@@ -115,7 +115,12 @@ class AxisWatch:
         """Record the motion that `motion.advance` makes with these arguments, which stay as they
         are.
         """
-        if here.torque is not None or not here.bodies.free:
+        if here.bodies.forcing.timed:
+            moving = here._replace(rates=here.rates.copy(), quaternion=here.quaternion.copy())
+            for part, length in between_edges(moving, duration):
+                self.motion(part, length)
+                advance(part, length)
+        elif here.torque is not None or not here.bodies.free:
             self._steps(here, duration)
         elif here.bodies.forcing.growth == 0.0:
             self._arc(here, duration)
@@ -123,9 +128,12 @@ class AxisWatch:
             self._slow(here, duration)
 
     def turn(self, here: MotionStretch) -> None:
-        """Record one turn of the axis about H in a motion free of pulses."""
+        """Record a motion free of pulses: one turn of the axis about H, behind the last edge of a
+        torque.
+        """
         first, second, _ = here.bodies.moments
-        self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
+        wait = np.maximum(max(here.bodies.forcing.edges, default=0.0) - here.since, 0.0)
+        self.motion(here, wait + CIRCLE * 0.5 * (first + second) / _momentum(here))
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
         np.minimum.at(self.least[number], self.rows[cases], least)  # a case may come twice
@@ -276,9 +284,8 @@ def _torque(here: MotionStretch) -> Array:
         (size * np.exp(1j * rate * here.since) for size, rate in here.bodies.forcing.turning),
         0.0 * here.since,
     )
-    lasting = (
-        np.array([turning.real, turning.imag, 0.0 * here.since]) + here.bodies.constant[:, None]
-    )
+    lasting = np.array([turning.real, turning.imag, 0.0 * here.since])
+    lasting += here.bodies.constant.reshape(3, -1)
     return lasting if here.torque is None else lasting + here.torque
 
 
@@ -328,19 +335,22 @@ class TorqueRamp(NamedTuple):
 class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
-    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3
-    from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last computed Sun
-    pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go round. ``over``
-    (n,) s: end of the last pulse, command and thrust. ``moves`` counts steps of Newton's method,
-    ``looked_back`` those of them to Sun pulses under thrust.
+    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad, (n,) or one, is that of the sensor
+    about axis 3 from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last
+    computed Sun pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go
+    round. ``over`` (n,) s: end of the last pulse, command and thrust. ``moves`` counts steps of
+    Newton's method, ``looked_back`` those of them to Sun pulses under thrust.
     """
 
-    def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
-        self.sun, self.sense, self.azimuth = sun, sense, azimuth
+    def __init__(
+        self, start: MotionStretch, sun: Array, sense: float, azimuth: Array | float
+    ) -> None:
+        self.sun = np.vstack([sun, np.broadcast_to(azimuth, sun.shape[1])])
+        self.sense = sense
         self._stretches = [start]
         self._latest = start  # motion from which the next Sun pulse is looked for
         self.over = start.since
-        ahead, _ = self._ahead(start, sun)
+        ahead, _ = self._ahead(start, self.sun)
         # as if one had come before t = 0
         self._number = 0
         self.time = start.since + (ahead - CIRCLE) / self._pace
@@ -428,7 +438,7 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun))
+        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun[:3]))
 
     @property
     def _pace(self) -> Array:
@@ -502,7 +512,7 @@ class SunPulseClock:
 
     def _ahead(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
         """`_off` in [0, 2π)."""
-        return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
+        return ahead(here.rates, here.quaternion, sun[:3], sun[3], self.sense)
 
 
 def sun_direction(days: float) -> Array:
@@ -533,7 +543,7 @@ def sun_direction(days: float) -> Array:
 
 
 def ahead(
-    rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float
+    rates: Array, quaternion: Array, sun: Array, azimuth: Array | float, sense: float
 ) -> tuple[Array, Array]:
     """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its
     rate, rad/s.

@@ -199,7 +199,8 @@ class Consequence(NamedTuple):
     Magnus 1970 (13)/(14). A torque fixed in space turns H by the ``precession`` M/|H| (rad/s);
     under any other H goes round, up to ``swing`` rad from the start. From rest the nutation swells
     to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), these are None
-    and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
+    and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. Of one that
+    is over before that period is, there is only ``beat``: what it drives from rest to. An axial
     part changes the spin at ``spin_rate`` rad/s².
     """
 
@@ -232,6 +233,13 @@ def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
             yield Consequence(disturbance, 0.0, None, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
             continue
         largest, period = driven.beat(A, turning, torque, disturbance.rate)
+        lasts = disturbance.end - disturbance.begin
+        if lasts < period:
+            swelling = math.sin(math.pi * min(lasts / period, 0.5))
+            driven_to = largest * swelling if swelling else abs(torque) / A * lasts
+            grown = float(rigid_body.nutation_angle(A, C, driven_to, spin))
+            yield Consequence(disturbance, None, None, None, None, grown, period, (), spin_rate)
+            continue
         # A beat that takes longer than everything planned, several times over, is a resonance for
         # the user.
         if period > RESONANT * spacecraft.horizon:

@@ -138,12 +138,9 @@ def remaining(plan: Plan) -> Note:
     if not {"max_on_time", "limits.horizon"} <= {*certain}:
         if spacecraft.disturbances and not plan.options.with_disturbances:
             return note("remains-unplanned", nutation_deg=left)
-        if spacecraft.disturbances:
-            tilt = math.atan(
-                spacecraft.inertia.A
-                * abs(steady_omega(spacecraft, plan.pulses.end))
-                / abs(spacecraft.axial)
-            )
+        steady = abs(steady_omega(spacecraft, plan.pulses.end))
+        if steady:
+            tilt = math.atan(spacecraft.inertia.A * steady / abs(spacecraft.axial))
             return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
         # Worst over root mean square: the centre is off by half the on-time's error and the
         # start's.

@@ -267,7 +267,7 @@ def uncertain(spacecraft: Spacecraft, on_times: Vector, goal: Vector, stretch: V
         return float(whole[-1].real), np.asarray(whole[:-1].imag / STEP)
 
     (A, dA), (C, dC), (wheel, dwheel) = parts(cases.A), parts(cases.C), parts(cases.wheel)
-    rates = [parts(component) for component in cases.omega0]
+    rates = [parts(component) for component in cases.untwisted(cases.omega0)]
     spin, dspin = rates[2]
     a = 1.0 - C / A
     da = C / A**2 * dA - dC / A
@@ -275,12 +275,14 @@ def uncertain(spacecraft: Spacecraft, on_times: Vector, goal: Vector, stretch: V
     dnutation = a * dspin + da * spin - dwheel / A + wheel / A**2 * dA
     start = A * (rates[0][1] + 1j * rates[1][1]) + dA * complex(rates[0][0], rates[1][0])
     tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
+    axis = cases.of_estimate((0.0, 0.0, 1.0))
+    lean = parts(axis[0])[1] + 1j * parts(axis[1])[1]
     pointed = (
-        start + axial * (tilt[1] - 1j * tilt[0])
+        start + axial * (tilt[1] - 1j * tilt[0] + lean)
         if spacecraft.goal.axis is not None
         else np.zeros(len(drawn))
     )
-    impulses = [[parts(part) for part in impulse] for impulse in cases.impulses]
+    impulses = [[parts(part) for part in cases.untwisted(each)] for each in cases.impulses]
     on = np.asarray(on_times)
     nominal = np.array([[value for value, _ in impulse] for impulse in impulses])
     changes = np.array([[change for _, change in impulse] for impulse in impulses])

@@ -119,7 +119,7 @@ class Plan(results.Data, results.Tabled):
         """
         schedule = feasible(self).pulses
         end = units.end_of_flight(
-            self.end + self.spacecraft.inertial_period if until is None else until
+            self.spacecraft.watched_until(self.end) if until is None else until
         )
         count = units.count("samples", samples, 2)
         fly = propagation.by_impulses if by_impulses else propagation.flown

@@ -214,10 +214,14 @@ def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
-    """True if ω beats against the disturbance at least once within the horizon; else it counts as
-    resonant.
+    """True if the disturbance lasts, and ω beats against it at least once within the horizon; else
+    it counts as resonant.
     """
-    return abs(spacecraft.nutation_rate + disturbance.rate) * spacecraft.horizon > 2.0 * math.pi
+    lasts = disturbance.begin <= 0.0 and disturbance.end >= spacecraft.horizon
+    return (
+        lasts
+        and abs(spacecraft.nutation_rate + disturbance.rate) * spacecraft.horizon > 2.0 * math.pi
+    )
 
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:

@@ -94,7 +94,6 @@ class ImpulseBuilder:
     def _coast(self, time: float) -> tuple[complex, float]:
         """ω and ω3 at ``time`` s if nothing more is fired and no disturbance drives ω."""
         since = time - self.now
-        drift = self.spacecraft.spin_drift
         growth = self.spacecraft.growth
         omega = self.omega
         spin = self.spin
@@ -107,8 +106,9 @@ class ImpulseBuilder:
             angle = self.a * equivalent * effect.travel - slower * since
             omega = omega * effect.transverse
             spin = equivalent * effect.along - slower
-        angle += 0.5 * self.a * drift * since * since
-        return omega * cmath.exp(-1j * angle), spin + drift * since
+        gained, turned = self.spacecraft.drifted(self.now, time)
+        angle += self.a * turned
+        return omega * cmath.exp(-1j * angle), spin + gained
 
     def _sink(self) -> tuple[float, float, float]:
         """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
@@ -123,17 +123,14 @@ class ImpulseBuilder:
         free, _ = self._coast(time)
         if not self.spacecraft.disturbances:
             return free
-        since = np.array([time - self.now])
         forced = 0.0 + 0.0j
         for disturbance in self.spacecraft.disturbances:
-            if disturbance.transverse != 0.0:
-                torque = np.array(
-                    [disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)]
-                )
-                rate = np.array([disturbance.rate])
-                forced += complex(
-                    driven.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0]
-                )
+            begin, lasts = disturbance.within(self.now, time)
+            if disturbance.transverse != 0.0 and lasts > 0.0:
+                torque = np.array([disturbance.after(begin).transverse])
+                rate, since = np.array([disturbance.rate]), np.array([lasts])
+                gained = driven.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)
+                forced += complex(gained[0]) * cmath.exp(1j * self.turning * (begin + lasts - time))
         return free + forced
 
     def acts(self, pulse: Pulse) -> complex:
@@ -143,7 +140,7 @@ class ImpulseBuilder:
         rate = self.rate(spin)
         slope = self.a * axial / self.C
         growth = self.spacecraft.growth
-        drift = self.a * self.spacecraft.spin_drift
+        drift = self.a * self.spacecraft.spin_drift(pulse.t)
         factor = response.width_factor(rate, slope, pulse.on_time, growth, drift)
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 

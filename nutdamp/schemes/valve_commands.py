@@ -10,7 +10,6 @@ shape of the thrust are corrected on the flown motion.
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -34,7 +33,7 @@ from nutdamp.spacecraft.constraints import (
     shortest_on_time,
 )
 from nutdamp.spacecraft.equipment import Block, Channel
-from nutdamp.spacecraft.model import Attitude, Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.model import Attitude, Inertia, Limits, Spacecraft, disturbing_after
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
@@ -397,14 +396,7 @@ class FlownBuilder:
                     quaternion=attitude.multiply(settled.quaternion, to_principal),
                     epoch=None,
                 ),
-                disturbances=tuple(
-                    replace(
-                        disturbance,
-                        transverse=disturbance.transverse
-                        * cmath.exp(1j * disturbance.rate * since),
-                    )
-                    for disturbance in at_leg.disturbances
-                ),
+                disturbances=disturbing_after(at_leg.disturbances, since),
                 limits=replace(
                     limits,
                     horizon=at_leg.horizon - since,

@@ -8,8 +8,9 @@ shown to people.
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -268,13 +269,34 @@ class Disturbance:
     """A torque that nobody commands, in principal body axes.
 
     ``transverse`` M1 + iM2 (N m, at t = 0) turns about axis 3 of the body at ``rate`` rad/s; 0 is
-    fixed in the body, minus the spin is nearly fixed in space. ``axial`` M3 (N m) is constant.
+    fixed in the body, minus the spin is nearly fixed in space. ``axial`` M3 (N m) is constant. It
+    acts from ``begin`` to ``end`` s.
     """
 
     transverse: complex
     axial: float = 0.0
     rate: float = 0.0
     name: str = ""
+    begin: float = 0.0
+    end: float = math.inf
+
+    def within(self, start: float, end: Any) -> tuple[Any, Any]:
+        """Time, s, from which it acts between ``start`` and ``end`` s, (n,) or one, and for how
+        long.
+        """
+        begin = max(start, self.begin)
+        return begin, np.maximum(np.minimum(end, self.end) - begin, 0.0)
+
+    def after(self, time: float) -> Disturbance:
+        """The same, where times count from ``time`` s."""
+        turned = self.transverse * cmath.exp(1j * self.rate * time)
+        begin = max(self.begin - time, 0.0) if self.begin > 0.0 else 0.0
+        return replace(self, transverse=turned, begin=begin, end=self.end - time)
+
+
+def disturbing_after(disturbances: Iterable[Disturbance], time: float) -> tuple[Disturbance, ...]:
+    """Disturbances that are not over at ``time`` s, from which their times count then."""
+    return tuple(each.after(time) for each in disturbances if each.end > time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -456,10 +478,35 @@ class Spacecraft(results.Data, results.Shown):
         size = float(np.linalg.norm(self.momentum))
         return energy_sink.damper(inertia.A, inertia.C, self.sense * inertia.wheel, size, 1.0)
 
+    def spin_drift(self, time: float) -> float:
+        """Spin acceleration by the axial disturbances at ``time`` s, rad/s²."""
+        acting = (each for each in self.disturbances if each.begin <= time < each.end)
+        return math.fsum(each.axial for each in acting) / self.inertia.C
+
+    def drifted(self, start: float, end: Any) -> tuple[Any, Any]:
+        """Spin (rad/s) that the axial disturbances add from ``start`` to ``end`` s, and the turn
+        (rad) that this adds.
+        """
+        gained: Any = 0.0
+        turned: Any = 0.0
+        for disturbance in self.disturbances:
+            begin, lasts = disturbance.within(start, end)
+            more = disturbance.axial / self.inertia.C * lasts
+            gained = gained + more
+            turned = turned + more * (end - begin - 0.5 * lasts)
+        return gained, turned
+
     @property
-    def spin_drift(self) -> float:
-        """Spin acceleration by the axial disturbances, rad/s²."""
-        return math.fsum(disturbance.axial for disturbance in self.disturbances) / self.inertia.C
+    def edges(self) -> list[float]:
+        """Times after t = 0, s, at which disturbances begin or end, in order."""
+        times = {time for each in self.disturbances for time in (each.begin, each.end)}
+        return sorted(time for time in times if 0.0 < time < math.inf)
+
+    def watched_until(self, last: float) -> float:
+        """Time up to which a flight is looked at whose pulses end at ``last`` s: a nutation period
+        after these and after the last disturbance begins or ends.
+        """
+        return max([last, *self.edges]) + self.inertial_period
 
     @property
     def torquer(self) -> Steerable | None:

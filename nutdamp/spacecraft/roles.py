@@ -27,7 +27,8 @@ def as_known(spacecraft: Spacecraft, *, disturbed: bool) -> Spacecraft:
     """Spacecraft as schemes know it: ``disturbed`` or not, without a goal of a spin that stays."""
     known = spacecraft if disturbed else replace(spacecraft, disturbances=())
     axial = any(channel.axial for channel in known.channels)
-    if known.goal.spin is None or known.spin_drift or axial:
+    axial = axial or any(disturbance.axial for disturbance in known.disturbances)
+    if known.goal.spin is None or axial:
         return known
     return (
         replace(known, goal=replace(known.goal, spin=None))

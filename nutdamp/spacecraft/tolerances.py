@@ -76,6 +76,12 @@ class Dispersions:
     C: Known = tolerance(
         "inertia", "Of the moment of inertia about the spin axis, kg m² or %.", "1.6 kg m^2"
     )
+    inertia_tensor: Known = tolerance(
+        "inertia",
+        "Of each entry of the inertia tensor on its own, in the axes of the file, kg m² or %; "
+        "of a product that share of √(Ii Ij).",
+        "1 %",
+    )
     wheel_momentum: Known = tolerance(
         "momentum", "Of the angular momentum of the wheel, N m s or %.", "0.5 N m s"
     )

@@ -186,6 +186,7 @@ def disturbance_table(spacecraft: Spacecraft) -> DataTable:
             kind=TEXT,
             words=lambda row: row.disturbance.name or f"number {numbers[id(row)]}",
         ),
+        *file_columns("json", "from_s=disturbance.begin", "until_s=disturbance.end"),
         Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
         *file_columns(
             "json",
@@ -203,11 +204,17 @@ def disturbance_table(spacecraft: Spacecraft) -> DataTable:
 
 
 def _effects(row: Consequence) -> Iterator[str]:
-    if row.resonant or row.tilt is None:
+    begin, end = row.disturbance.begin, row.disturbance.end
+    if begin > 0.0 or end < math.inf:
+        until = f" until {duration(end)}" if end < math.inf else ""
+        yield f"acts from {duration(begin)}{until}"
+    if row.beat is None:
         reached = ", ".join(
             f"{degrees(mark)} after {duration(time)}" for mark, time in row.resonant
         )
         yield f"resonant with the nutation: drives it to {reached}"
+    elif row.tilt is None:
+        yield f"from rest drives the nutation to {degrees(row.beat)}"
     elif row.disturbance.transverse != 0.0:
         yield f"forces a tilt of {degrees(row.tilt)}, forced rate {quantity(row.forced, 'rad/s')}"
         if row.swing is None:
@@ -236,7 +243,8 @@ def tolerance_table(spacecraft: Spacecraft) -> DataTable:
     """Differences allowed between true values and the file's; those of one size share a row."""
     alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
-        thrusters = alike.setdefault((entry.tolerance, entry.kind, size_text(entry)), [])
+        name = entry.name if entry.tolerance == "inertia_tensor" else entry.tolerance
+        thrusters = alike.setdefault((name, entry.kind, size_text(entry)), [])
         tolerance = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
         names = tolerance if isinstance(tolerance, Mapping) else ()

@@ -84,7 +84,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     pulses = plan.pulses
     if row.dated:
         return _dated(
-            plan, row, pulses.end + plan.spacecraft.inertial_period if until is None else until, xml
+            plan, row, plan.spacecraft.watched_until(pulses.end) if until is None else until, xml
         )
     if form == "json":
         from nutdamp.files.tabular import json_text

@@ -350,6 +350,7 @@ def _disturbances(spacecraft: Spacecraft) -> list[dict[str, Any]]:
     rows = []
     for each in spacecraft.disturbances:
         across = axes @ [each.transverse.real, each.transverse.imag, 0.0]
-        rows.append({"torque": across.tolist(), "rate": each.rate or None})
-        rows.append({"torque": (axes[:, 2] * each.axial).tolist()})
+        times = {"from": each.begin, "until": each.end if each.end < math.inf else None}
+        rows.append({"torque": across.tolist(), "rate": each.rate or None, **times})
+        rows.append({"torque": (axes[:, 2] * each.axial).tolist(), **times})
     return rows

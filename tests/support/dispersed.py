@@ -124,6 +124,19 @@ def exact_two_pulse(scale: float, **tolerances: object) -> Study:
     return Study(DispersedModel(replace(body, dispersions=requested), plan.pulses), seed=11)
 
 
+def tensors(model: DispersedModel, size: float = 0.01) -> DispersedModel:
+    """The model with all entries of its inertia tensor dispersed in place of A and C."""
+    spread = replace(
+        model.spacecraft.dispersions or Dispersions(),
+        A=None,
+        C=None,
+        wheel_momentum=None,
+        correlation=(),
+        inertia_tensor=normal(size, relative=True),
+    )
+    return DispersedModel(replace(model.spacecraft, dispersions=spread), model.schedule)
+
+
 def first_cases(study: Study, count: int) -> dict[str, np.ndarray]:
     """Draws of the first cases, by input, (n,)."""
     assert count <= BLOCK

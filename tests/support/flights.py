@@ -21,7 +21,7 @@ from nutdamp.physics import attitude, series
 from nutdamp.physics.thruster import Ramp
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block
-from nutdamp.spacecraft.model import Attitude, Spacecraft
+from nutdamp.spacecraft.model import Attitude, Disturbance, Spacecraft
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule
 from nutdamp.spacecraft.tolerances import Dispersions
 
@@ -131,21 +131,47 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
     quaternion = attitude.multiply(
         attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T)
     )
-    first, second, third = (float(moment) for moment in case.moments)
+    first, second, third = (float(np.squeeze(moment)) for moment in case.moments)
     per_kg = None
     if case.per_kg is not None:
         one, two, three = (float(np.squeeze(part)) for part in case.per_kg)
         per_kg = one, two, three
+    own = np.eye(3) if case.turn is None else case.turn[:, :, 0]
     true = replace(
-        body,
+        in_own_axes(body, own),
         inertia=replace(
-            body.inertia, moments=(first, second, third), wheel=float(np.squeeze(case.wheel))
+            body.inertia,
+            moments=(first, second, third),
+            wheel=float(np.squeeze(case.wheel)),
+            axes=axes @ own,
         ),
-        omega0=np.array(case.omega0, dtype=float),
+        omega0=np.array(case.omega0, dtype=float).reshape(3),
         attitude=Attitude(quaternion),
         tank=None if body.tank is None else replace(body.tank, inertia_per_kg=per_kg),
     )
     return true, Schedule(tuple(pulses))
+
+
+def in_own_axes(spacecraft: Spacecraft, own: Array) -> Spacecraft:
+    """The spacecraft with vectors in other body axes, the columns of ``own`` (3, 3)."""
+
+    def disturbance(one: Disturbance) -> Disturbance:
+        x, y, z = np.array([one.transverse.real, one.transverse.imag, one.axial]) @ own
+        return replace(one, transverse=complex(x, y), axial=float(z))
+
+    sensor = spacecraft.sun_sensor
+    if sensor is not None:
+        x, y, _ = np.array([math.cos(sensor.azimuth), math.sin(sensor.azimuth), 0.0]) @ own
+        sensor = replace(sensor, azimuth=math.atan2(y, x))
+    channels = [
+        one.of(torque=one.torque @ own) if one.thrusters else one for one in spacecraft.channels
+    ]
+    return replace(
+        spacecraft,
+        channels=tuple(channels),
+        disturbances=tuple(map(disturbance, spacecraft.disturbances)),
+        sun_sensor=sensor,
+    )
 
 
 def _thrusting(

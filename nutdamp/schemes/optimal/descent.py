@@ -101,7 +101,7 @@ class Task:
         start = spacecraft.initial
         # External torques with and without disturbances, see `Bodies`.
         self._forced = dynamics.constant, dynamics.forcing
-        self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
+        self._coasting = np.zeros(3), dynamics.forcing._replace(turning=(), timed=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
         self._decays = spacecraft.growth != 0.0
         self._free = dynamics.free and not self._decays

@@ -209,8 +209,7 @@ class Problem:
     @property
     def closed(self) -> bool:
         """True where nothing acts between pulses."""
-        alone = not self._dynamics.constant.any() and not self._dynamics.forcing.turning
-        return alone and self.spacecraft.growth == 0.0
+        return not (self.spacecraft.disturbances or self.spacecraft.growth)
 
     def program(
         self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None

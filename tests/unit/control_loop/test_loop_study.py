@@ -24,15 +24,16 @@ from nutdamp.control_loop.dispersion import (
     run,
 )
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.control_loop.simulation import fly
+from nutdamp.control_loop.simulation import LoopRun, fly
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.montecarlo.statistics import share_interval
 from nutdamp.montecarlo.study import study_of
+from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Channel, Sensor
-from nutdamp.spacecraft.model import Attitude, Disturbance, Keep, Requirement, Spacecraft
+from nutdamp.spacecraft.model import Attitude, Disturbance, Goal, Keep, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.loop_cases import LoopCasesWriter
@@ -129,6 +130,38 @@ def test_every_case_has_its_own_body_thrusters_and_sensor() -> None:
     assert case.tilt == pytest.approx([draws["attitude x"], draws["attitude y"]])
     assert case.scatter is not None
     assert case.scatter.of(3) == case.scatter.of(3) != case.scatter.of(4)
+
+
+def test_a_drawn_tensor_moves_nothing_else_in_the_axes_of_the_file() -> None:
+    """Rates, torques and gyros of a case are where the file has them, and its outcome is that of
+    its own flight.
+    """
+    drawn = replace(ALL, A=None, C=None, inertia_tensor=relative(0.02), position={}, attitude=None)
+    still = replace(drawn, thrust_direction={}, thrust={})
+    body = replace(
+        craft(dispersions=still),
+        goal=Goal(axis=np.array([0.0, 0.6, 0.8])),
+        attitude=Attitude(np.array([0.8, 0.36, 0.48, 0.0])),
+    )
+    dispersed = study(body, 20.0)
+    assert dispersed.alone == "three different moments of inertia"
+    draws, case = dispersed.draws_of(7), dispersed.case(7)
+    truth, axes = case.truth, case.truth.inertia.axes
+    change = [[draws[f"inertia {''.join(sorted(a + b))}"] for b in "xyz"] for a in "xyz"]
+    assert truth.inertia.tensor == pytest.approx(body.inertia.tensor + np.array(change))
+    assert np.abs(axes - np.eye(3)).max() > 1e-3
+    off = [draws[f"omega0_{axis}"] for axis in (1, 2, 3)]
+    assert axes @ truth.omega0 == pytest.approx(body.omega0 + off)
+    for own, usual in zip(truth.channels, body.channels, strict=True):
+        assert axes @ own.torque == pytest.approx(usual.torque, abs=1e-12)
+    gyros = present(truth.loop).sensor.axes
+    assert gyros @ axes.T == pytest.approx(GYRO.axes, abs=1e-12)
+    measured = dispersed.measured(dispersed.fly([case]))[0][:, 0]
+    flown = LoopRun(dispersed.law, case, 20.0).flight
+    ends = flown.sampled(2, 20.0).momentum[[0, -1]]
+    assert measured[3] == pytest.approx(attitude.angle_between(*ends), abs=1e-12)
+    aim = attitude.angle_between(ends[1], present(body.goal.axis))
+    assert measured[4] == pytest.approx(aim, abs=1e-12)
 
 
 def test_torques_are_those_of_a_dispersed_schedule() -> None:

@@ -367,6 +367,10 @@ CASES = {
         verified(Sensor(rate=20.0), disturbances=(Disturbance(0.02 + 0.01j, 0.03),)),
         40.0,
     ),
+    "disturbed for a time": (
+        verified(Sensor(), disturbances=(Disturbance(0.5 + 0.2j, 0.1, begin=3.0, end=21.0),)),
+        40.0,
+    ),
     "three moments": (verified(Sensor(), inertia=Inertia((120.0, 100.0, 80.0))), 40.0),
     "a long wait, while the spin falls": (verified(FELT, dissipation=20.0, channels=STRONG), 100.0),
 }

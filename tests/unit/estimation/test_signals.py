@@ -252,6 +252,7 @@ def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file
     leak = [
         {"name": "leak", "torque": [0.05, 0.02, 0.01]},
         {"name": "drag", "torque": [0.03, 0, 0], "rate": 0.4},
+        {"name": "burn", "torque": [0.3, 0, 0], "from": "3 s", "until": "11 s"},
     ]
     body = nutdamp.load(FILE | {"inertia": tensor, "disturbances": leak})
     pulses = Schedule(

@@ -267,6 +267,13 @@ TANK = (
     "C: 5}}\nmass: 250 kg\n"
 )
 LEAK = "disturbances: [{name: leak, torque: [5 mN m, 2 mN m, 0], rate: -1.3 rad/s}]\n"
+BURNS = """
+disturbances:
+- {name: past, torque: [5 N m, 0, 0], until: 39 s}
+- {name: burn, torque: [0, 3 N m, 0], rate: 1, from: 30 s, until: 50}
+- {name: next, torque: [0, 3 N m, 1 N m], from: 0.9 min}
+- {name: on, torque: [0, 20 mN m, 0], until: 55 s}  # so long
+"""
 
 TEXTS = {
     "symmetric": SOUNDER + ATTITUDE,
@@ -277,6 +284,8 @@ TEXTS = {
     + ATTITUDE,
     "tank": SOUNDER + ATTITUDE + TANK,
     "turning torque": SOUNDER + ATTITUDE + LEAK,
+    "torques that end": SOUNDER + ATTITUDE + BURNS,
+    "torques that end, indented": SOUNDER + ATTITUDE + BURNS.replace("- {", "  - {"),
 }
 
 

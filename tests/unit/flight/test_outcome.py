@@ -33,7 +33,15 @@ from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft.equipment import Steerable
-from nutdamp.spacecraft.model import Disturbance, Goal, Keep, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.model import (
+    Disturbance,
+    Goal,
+    Inertia,
+    Keep,
+    Limits,
+    Requirement,
+    Spacecraft,
+)
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.views.verdict import statement
@@ -69,6 +77,41 @@ def test_it_is_the_motion_of_the_reference_integrator_at_that_time(
     assert seen.final.axis == pytest.approx(motion.rotation[:, 2], abs=1e-9)
     assert seen.final.spin == pytest.approx(motion.rates[2], abs=1e-9)
     assert np.all(seen.around_pulses()[1].t <= time)
+
+
+@pytest.mark.parametrize("moments", [(120.0, 120.0, 80.0), (120.0, 105.0, 80.0)])
+def test_a_disturbance_acts_between_its_times(moments: tuple[float, float, float]) -> None:
+    """By DOP853 with the torque on between them; one over all of the flight is one without."""
+    burn = Disturbance(3.0 + 1.0j, 0.2, begin=2.0, end=7.3)
+    body = replace(spinner(), inertia=Inertia(moments), disturbances=(burn,))
+    start = attitude.matrix(body.initial.quaternion)
+    push = reference.Push(2.0, 7.3, np.array([3.0, 1.0, 0.2]))
+    flown = propagation.flown(body, Schedule(), body.watched_until(0.0))
+    times = np.array([1.0, 2.0, 4.0, 7.3, 9.0])
+    rates, quaternions = flown.motion(times)
+    motion = reference.path(moments, reference.Motion(body.omega0, start), [push], times)
+    assert rates == pytest.approx(np.array([one.rates for one in motion]), abs=1e-11)
+    seen = np.array([attitude.matrix(one) for one in quaternions])
+    assert seen == pytest.approx(np.array([one.rotation for one in motion]), abs=1e-10)
+    whole, lasting = (
+        propagation.flown(replace(body, disturbances=(each,)), Schedule(), 9.0).motion(times)
+        for each in (replace(burn, begin=0.0, end=100.0), replace(burn, begin=0.0, end=math.inf))
+    )
+    assert whole[0] == pytest.approx(lasting[0], abs=1e-15)
+    assert whole[1] == pytest.approx(lasting[1], abs=1e-15)
+
+
+def test_the_nutation_on_the_way_is_looked_for_in_the_time_of_a_disturbance() -> None:
+    """A burn against the spin axis from 20 s on, long after the only pulse."""
+    burn = Disturbance(6.0 + 0.0j, begin=20.0, end=26.0)
+    body = replace(spinner(), disturbances=(burn,), keep=(Keep("H", None, 0.0, 0.1),))
+    flown = propagation.flown(body, Schedule(), 40.0)
+    (aspect,) = aspects(flown)
+    times = np.linspace(0.0, 40.0, 40_001)
+    track = flown.sampled(40_001, 40.0)
+    assert aspect.largest == pytest.approx(track.nutation.max(), abs=1e-7)
+    assert 20.0 < aspect.largest_at < times[-1]
+    assert aspect.largest > 1.05 * body.nutation
 
 
 @pytest.mark.parametrize("fly", FLIES)

@@ -11,7 +11,7 @@ import pytest
 
 from nutdamp.files import facts, reader
 from nutdamp.flight.verification import Verification, verify
-from nutdamp.physics import attitude, body, response, triaxial
+from nutdamp.physics import attitude, body, response
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import plan
 from nutdamp.spacecraft.equipment import Channel, Thruster
@@ -35,6 +35,7 @@ VALVE = (
 WHEEL = f"{JETS}wheel: {{momentum: 40 N m s}}\n"
 DAMPER = f"{JETS}dissipation: {{time_constant: 600 s}}\n"
 LEAK = f"{JETS}disturbances: [{{torque: [20 mN m, 0, 0], fixed_in: inertial}}]\n"
+BURN = f"{JETS}disturbances: [{{torque: [2 N m, 1 N m, 0], from: 1 s, until: 20 s}}]\n"
 
 Plant = Callable[[pytest.MonkeyPatch], None]
 
@@ -84,13 +85,20 @@ def against(patch: pytest.MonkeyPatch) -> None:
     )
 
 
+def later_end(patch: pytest.MonkeyPatch) -> None:
+    read = reader._disturbance
+    patch.setattr(
+        reader, "_disturbance", lambda *parts: replace(read(*parts), end=read(*parts).end + 1e-3)
+    )
+
+
 def narrower(patch: pytest.MonkeyPatch) -> None:
     usual = body.momentary
 
     def cones(*parts: Any) -> Any:
         return usual(*parts)._replace(nutation=0.9 * usual(*parts).nutation)
 
-    patch.setattr(triaxial, "momentary", cones)
+    patch.setattr(body, "momentary", cones)
 
 
 def to_body(patch: pytest.MonkeyPatch) -> None:
@@ -117,6 +125,7 @@ FAULTS: dict[str, tuple[str, Plant]] = {
     "time constant x 1.1": (DAMPER, scaled(Spacecraft, "growth", 1.0 / 1.1)),
     "mass flow x 2": (JETS, scaled(Thruster, "mass_flow", 2.0)),
     "sign of fixed_in": (LEAK, against),
+    "until 1 ms later": (BURN, later_end),
     "nutation x 0.9": (JETS, narrower),
     "width factor 1": (JETS, lambda patch: patch.setattr(response, "width_factor", lambda *_: 1.0)),
     "force x 1.02": (JETS, stronger),

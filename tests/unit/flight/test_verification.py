@@ -56,6 +56,7 @@ TILTED = documented(
             Disturbance(0.02 + 0.01j),
             Disturbance(0.01j, rate=-1.0),
             Disturbance(0j, axial=0.01),
+            Disturbance(0.5 - 0.2j, 0.1, 0.7, begin=1.0, end=5.0),
         ),
         dissipation=900.0,
         limits=Limits(tick=0.001),

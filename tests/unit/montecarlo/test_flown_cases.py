@@ -25,9 +25,10 @@ import nutdamp
 from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
 from nutdamp.flight.cones import aspects
+from nutdamp.flight.verification import command, reference_model
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
-from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, vectors
+from nutdamp.montecarlo.statistics import OUTPUTS, first_order, measure, sampled_shares, vectors
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.montecarlo.study import run as fly_all
 from nutdamp.physics import attitude, motion
@@ -66,6 +67,11 @@ THREE = {
     ),
 }
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
+BURNS = (
+    Disturbance(1.0 + 0.5j, 0.05, begin=0.4, end=3.1),
+    Disturbance(0.3 + 0.0j, rate=-3.0, begin=2.0),
+    Disturbance(0.4j, -0.02, end=1.3),
+)
 LEAKING = DispersedModel(
     replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule
 )
@@ -184,6 +190,18 @@ def test_the_quadrature_of_wide_pulses_is_exact_to_rounding() -> None:
 FLOWN = {
     "steerable, oblate, spin reversed": STEERED,
     "disturbances, dissipation": LEAKING,
+    "disturbances with an end": DispersedModel(
+        replace(PROLATE.spacecraft, disturbances=BURNS), PROLATE.schedule
+    ),
+    "disturbances with an end, three moments, dissipation": DispersedModel(
+        replace(THREE["three moments"].spacecraft, disturbances=BURNS, dissipation=400.0),
+        PROLATE.schedule,
+    ),
+    "tensors": dispersed.tensors(PROLATE),
+    "tensors, three moments": dispersed.tensors(THREE["three moments, oblate, spin reversed"]),
+    "tensors, steerable, disturbances with an end": dispersed.tensors(
+        DispersedModel(replace(STEERED.spacecraft, disturbances=BURNS), STEERED.schedule)
+    ),
     "prolate, dissipation": SYMMETRIC["prolate, dissipation"],
     "oblate, dissipation": dispersed.sinking(STEERED, 5.0),
     "despun, a wheel": SYMMETRIC["despun, a wheel"],
@@ -199,6 +217,73 @@ def test_through_real_widths_each_case_is_the_flight_of_its_own_spacecraft(name:
     for case in range(0, CASES, 6):
         one = dispersed.one_of(draws, case)
         assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
+
+
+TENSORS = """
+name: Products
+inertia: {tensor: [[120, 2, 1], [2, 112, 0.5], [1, 0.5, 80]]}
+omega0: [0.1, 0.05, 3]
+attitude: {quaternion: [0.8, 0.36, 0.48, 0]}
+thrusters:
+  - {name: +M1, position: [0, 0, 0.9], direction: [0.1, -1, 0], force: 10 N}
+  - {name: +M2, torque: [0.3, 9, 0.2], min_on_time: 10 ms}
+disturbances: [{torque: [1, 2, 0.5], from: 1 s, until: 3 s}]
+dispersions: {inertia_tensor: {normal: 2 %}, omega0: {normal: 1 deg/s}}
+"""
+
+
+def test_cases_of_a_tensor_fly_as_its_equations_in_the_axes_of_the_file() -> None:
+    """The file with the drawn tensor and rates, integrated by DOP853 without principal axes."""
+    craft = nutdamp.read(TENSORS)
+    starts = zip(craft.channels, (0.7, 2.2), (0.6, 0.4), strict=True)
+    schedule = Schedule(tuple(channel_pulse(*each) for each in starts))
+    dispersed_ = study_of(craft, schedule)
+    assert [entry.size for entry in dispersed_.model.inputs.drawn][:3] == pytest.approx(
+        [2.4, 0.02 * math.sqrt(120.0 * 112.0), 0.02 * math.sqrt(120.0 * 80.0)]
+    )
+    for case in range(3):
+        draws = dispersed_.draws_of(case)
+        off = {name[-2:]: draw for name, draw in draws.items() if name.startswith("inertia")}
+        change = [[off["".join(sorted(row + column))] for column in "xyz"] for row in "xyz"]
+        rates = np.array([0.1, 0.05, 3.0])
+        rates += [draws[f"omega0_{axis}"] for axis in (1, 2, 3)]
+        tensor = (craft.inertia.tensor + np.array(change)).tolist()
+        true = craft.with_(inertia={"tensor": tensor}, omega0=rates.tolist())
+        model = reference_model(true, 100_000)
+        for one in schedule:
+            command(model, true, one)
+        path = model.fly(model.initial, 0.0, schedule.end)
+        ends = np.column_stack([model.initial, path(schedule.end)])
+        begun, ended = model.vectors(ends, np.array([0.0, schedule.end]))[2]
+        nutation, shift, error, spin, _ = dispersed_.outputs_of(draws)
+        assert nutation == pytest.approx(model.nutation(ends[:, 1], schedule.end), abs=1e-10)
+        assert shift == pytest.approx(attitude.angle_between(begun, ended), abs=1e-10)
+        assert error == pytest.approx(attitude.angle_between(craft.momentum, ended), abs=1e-10)
+        assert spin == pytest.approx(model.third @ (ends[:3, 1] - ends[:3, 0]), abs=1e-10)
+
+
+def test_tensors_are_those_of_bodies_and_their_axes_smooth() -> None:
+    """Draws that no body has are drawn again; the shares that derivatives and cases show agree
+    also where equal moments let principal axes turn at once.
+    """
+    wild = dispersed.tensors(PROLATE, 0.3)
+    cases = wild.cases(dispersed.first_cases(Study(wild), 2000))
+    first, second, third = cases.moments
+    assert min(first.min(), second.min(), third.min()) > 0.0
+    assert np.all(third <= (first + second) * (1.0 + 1e-9))
+    assert np.all(np.maximum(first, second) <= np.minimum(first, second) + third * (1.0 + 1e-9))
+    assert np.linalg.det(np.moveaxis(cases.turn, -1, 0)) == pytest.approx(1.0)
+    still = dispersed.tensors(PROLATE, 0.002)
+    spread_ = Dispersions(inertia_tensor=present(still.spacecraft.dispersions).inertia_tensor)
+    model = DispersedModel(replace(still.spacecraft, dispersions=spread_), still.schedule)
+    study = Study(model)
+    draws = dispersed.first_cases(study, 4000)
+    outcome = vectors(model, study.flies(model.cases(draws)), 4000)
+    shares = study.first_order.shares("nutation")
+    sampled = sampled_shares(draws, outcome)
+    for entry, share in zip(model.inputs.drawn, shares, strict=True):
+        assert share == pytest.approx(sampled[entry.name]["nutation"], abs=0.05)
+    assert shares.max() > 0.2
 
 
 def test_a_case_that_coasts_while_others_fire_takes_no_steps(
@@ -248,6 +333,10 @@ BLOCKS = {
     "three moments": by_blocks(spin=2.0, moments=(110.0, 98.0, 150.0)),
     "a wheel": dispersed.wheeled(by_blocks(spin=1.3), 60.0),
     "disturbances": by_blocks(disturbances=(Disturbance(0.02 + 0.01j, 0.03), LEAKS[1])),
+    "tensors": dispersed.tensors(by_blocks(spin=1.3)),
+    "a disturbance with an end": by_blocks(
+        spin=1.3, disturbances=(Disturbance(0.3 + 0.1j, 0.03, begin=6.0, end=40.0),)
+    ),
 }
 
 
@@ -406,14 +495,20 @@ MODELS = {
     "dissipation": with_directions(dispersed.sinking(JETS)),
     "three moments": with_directions(dispersed.with_jets(moments=(120.0, 105.0, 80.0))),
     "disturbances": with_directions(JETS, disturbances=LEAKS, dissipation=400.0),
+    "disturbances with an end": with_directions(JETS, disturbances=BURNS),
+    "tensors": with_directions(dispersed.tensors(JETS)),
+    "burn after the pulses": with_directions(
+        JETS, disturbances=(Disturbance(2.0 + 0.5j, begin=20.0, end=24.0),)
+    ),
     "blocks": with_directions(by_blocks()),
 }
 
 
 def end_of(made: propagation.Flight) -> float:
-    """When the axis has gone round H once more after the last pulse."""
+    """When the axis has gone round H once more after the last pulse and the last disturbance."""
     size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
-    return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size
+    last = max([made.schedule.end, *made.spacecraft.edges])
+    return last + math.pi * (made.moments[0] + made.moments[1]) / size
 
 
 def seen_in(model: DispersedModel, draws: dict[str, np.ndarray]) -> np.ndarray:
