@@ -414,6 +414,8 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     turned, old = later.after.attitude, later.before.attitude
     if turned is None:
         return
+    if old is not None:  # the other directions of the file stay in its frame
+        turned = turned.seen_in(old.frame)
     parts = flow_list(turned.quaternion)
     keys = {"quaternion": parts, "epoch": turned.epoch, "frame": turned.frame}
     if (

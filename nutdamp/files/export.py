@@ -26,6 +26,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
 from nutdamp.montecarlo.statistics import Array
 from nutdamp.montecarlo.study import Study
+from nutdamp.physics.attitude import PRECESSED
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -97,7 +98,7 @@ def _vector(vector: Iterable[float] | Vector) -> str:
     return "[" + ", ".join(repr(float(part) + 0.0) for part in vector) + "]"
 
 
-FRAMES = ("EME2000", "J2000", "GCRF")  # inertial frames that the formats have a name for
+FRAMES = ("EME2000", "J2000", "GCRF")  # inertial frames of the formats
 AXES = {
     "EME2000": "J2000",
     "J2000": "J2000",
@@ -145,8 +146,8 @@ class AttitudeSegment(NamedTuple):
 
 
 def reference(spacecraft: Spacecraft) -> Reference:
-    """Epoch and frame of the file; raises BadRequest with the lines to add, or for those that no
-    format knows.
+    """Epoch of the file, and its frame, or EME2000 for those of the ecliptic and of date; raises
+    BadRequest with the lines to add, or for a frame that no format knows.
     """
     start = spacecraft.attitude
     if start is None or start.epoch is None or start.frame is None:
@@ -158,13 +159,13 @@ def reference(spacecraft: Spacecraft) -> Reference:
         raise BadRequest(
             f"this format needs {names}, which the spacecraft file does not give; {cure}"
         )
-    if start.frame not in FRAMES:
+    frame = "EME2000" if start.frame in PRECESSED else start.frame
+    if frame not in FRAMES:
         problem = (
-            f"{start.frame!r} is no frame that the format knows; "
-            f"expected one of {', '.join(FRAMES)}"
+            f"{frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
         )
         raise Unsuitable(("attitude", "frame"), problem)
-    return Reference(Epoch.parse(start.epoch), start.frame)
+    return Reference(Epoch.parse(start.epoch), frame)
 
 
 def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:

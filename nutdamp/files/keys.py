@@ -775,8 +775,10 @@ class AttitudeSection(Section):
         "Date and time of t = 0, ISO 8601, from 1972 to 9999; without a zone it is UTC.",
         "2026-03-01T12:00:00Z",
     )
-    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field(
-        "Inertial frame of the attitude.", "EME2000"
+    frame: Literal["EME2000", "J2000", "GCRF", "ECLIPJ2000", "ECLIPDATE", "MOD"] | None = Field(
+        "Inertial frame of the attitude and of every direction of the file; in a frame of the "
+        "ecliptic right ascension and declination stand for longitude and latitude.",
+        "EME2000",
     )
 
 

@@ -498,7 +498,8 @@ def _sun(contents: keys.SpacecraftFile) -> Vector | None:
     from nutdamp.common.time import Epoch  # the Sun by the epoch
     from nutdamp.physics.sky import sun_direction
 
-    return sun_direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
+    days = Epoch.parse(contents.attitude.epoch).days_of_j2000
+    return attitude.frame_axes(contents.attitude.frame, days).T @ sun_direction(days)
 
 
 def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:

@@ -35,6 +35,7 @@ from nutdamp.units import FASTEST, KINDS, bar, reading, shown
 
 KEEP = "keep one of the two"
 SKY = "[right ascension, declination]"
+OF_DATE = ", the date of its equinox; or take ECLIPJ2000 or EME2000"
 SUN = f": {SKY}, or sun: epoch"
 POINTING = ", which says where the body points at t = 0"
 SAMPLED = ", such as rate: 100 Hz: it applies to samples"
@@ -65,6 +66,8 @@ RULES = (
     ("attitude.phase", "beside", ".quaternion", KEEP),
     ("attitude.sun_phase", "beside", ".quaternion .phase", KEEP),
     ("attitude.sun_phase", "needs", "sun", SUN),
+    ("attitude.frame=ECLIPDATE", "needs", ".epoch", OF_DATE),
+    ("attitude.frame=MOD", "needs", ".epoch", OF_DATE),
     ("sun", "needs", "attitude", POINTING),
     ("sun=epoch", "needs", "attitude.epoch", f", the date of t = 0; or give {SKY}"),
     ("sun_sensor", "needs", "sun", SUN),

@@ -32,7 +32,7 @@ from nutdamp.estimation.search import BROKEN, absurd
 from nutdamp.files.ccsds.read import History, is_history, read_history
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
-from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import KINDS
 
@@ -46,12 +46,8 @@ def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> R
         raise BadRequest(
             "the spacecraft file has no attitude.epoch to count the times of a history from"
         )
-    if history.frame is not None and start.frame not in (None, history.frame):
-        raise BadRequest(
-            f"the history is in {history.frame}, the spacecraft file in {start.frame}: "
-            "expected one frame"
-        )
-    signals = of_quaternions(history.quaternions, spacecraft)
+    seen = Attitude(history.quaternions, start.epoch, history.frame).seen_in(start.frame)
+    signals = of_quaternions(seen.quaternion, spacecraft)
     if history.rates is not None:
         signals |= dict(zip(GYROS, history.rates.T, strict=True))
     times = history.times + history.epoch.since(Epoch.parse(start.epoch))

@@ -182,7 +182,7 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
         (angles[0].heading, angles[1].heading),
         named,
         utc is not None,
-        "azimuths" if spacecraft.attitude is None else "right ascensions",
+        "azimuths" if spacecraft.attitude is None else f"{angles[0].heading}s",
         turns > STEEP,
         propagation.model_name([flown.schedule]),
         None if absent else workbench_of(flown, craft),

@@ -15,10 +15,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import numerics
+from nutdamp.errors import BadRequest
 
 Array = NDArray[np.float64]
 
 _BACK = np.array([1.0, -1.0, -1.0, -1.0])
+
+PRECESSED = ("ECLIPJ2000", "ECLIPDATE", "MOD")
+"""Frames that no message and no other program is written in; the last two are of date."""
+
+ARCSECOND = math.radians(1.0 / 3600.0)
+
+PRECESSION = (
+    (0.0000000260, -0.000002788, -0.00031238, 0.4932044, 10.556403, 0.0),
+    (-0.0000000176, -0.000000440, 0.00053289, 0.0511269, -46.811015, 84381.406),
+    (-0.0000000148, -0.000026452, -0.00018522, 1.5584176, 5038.481507, 0.0),
+    (-0.0000000434, -0.000000576, 0.00200340, -0.0001831, -46.836769, 84381.406),
+)
+"""Angles γ, φ and ψ of Fukushima and Williams and the obliquity of date, arcseconds, by powers of
+the centuries since J2000.0 from the highest down: precession IAU 2006, N. Capitaine, P. T. Wallace
+and J. Chapront 2003, A&A 412, 567, as in ``iauP06e`` of SOFA.
+"""
+
+BIAS = (-0.0146, -0.016617, -0.0068192)
+"""dα0, ξ0 and η0 of GCRF, arcseconds: IERS Conventions 2003, chapter 5."""
 
 
 def multiply(left: Array, right: Array) -> Array:
@@ -176,3 +196,31 @@ def square_to(vector: Array) -> Array:
     other = np.eye(3)[int(np.argmin(np.abs(vector)))]
     square = np.cross(vector, other)
     return np.asarray(square / np.linalg.norm(square))
+
+
+def frame_axes(frame: str | None, days: float = 0.0) -> Array:
+    """(3, 3), whose columns are the axes of a ``frame`` in EME2000; None is EME2000, as is J2000.
+
+    ``days``: the date of frames of date, since J2000.0 (TT). Raises BadRequest for an unknown one.
+    """
+    if frame in (None, "EME2000", "J2000"):
+        return np.eye(3)
+    if frame == "GCRF":
+        ascension, xi, eta = (ARCSECOND * part for part in BIAS)
+        return _about(0, -eta) @ _about(1, xi) @ _about(2, ascension)
+    if frame not in PRECESSED:
+        raise BadRequest(f"{frame!r} is no frame whose axes are known here")
+    centuries = 0.0 if frame == "ECLIPJ2000" else days / 36525.0
+    angles = [ARCSECOND * float(np.polyval(row, centuries)) for row in PRECESSION]
+    gamma, phi, psi, obliquity = angles
+    from_equator = _about(2, -psi) @ _about(0, phi) @ _about(2, gamma)
+    if frame == "MOD":
+        from_equator = _about(0, -obliquity) @ from_equator
+    return np.asarray(from_equator.T)
+
+
+def _about(axis: int, angle: float) -> Array:
+    """(3, 3): components in axes turned by ``angle`` rad about one of them, from those before."""
+    half = np.zeros(4)
+    half[0], half[axis + 1] = math.cos(0.5 * angle), math.sin(0.5 * angle)
+    return matrix(half).T

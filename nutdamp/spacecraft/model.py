@@ -301,11 +301,36 @@ def disturbing_after(disturbances: Iterable[Disturbance], time: float) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """Attitude at t = 0 from the file: unit quaternion body (file axes) -> frame, scalar first."""
+    """Attitude at t = 0 from the file: unit quaternion body (file axes) -> frame, scalar first.
+
+    All directions in space of a spacecraft, and of its flights, are in this ``frame``.
+    """
 
     quaternion: Vector
     epoch: str | None = None
     frame: str | None = None
+
+    @property
+    def ecliptic(self) -> bool:
+        """True where the two angles of a direction are longitude and latitude."""
+        return (self.frame or "").startswith("ECLIP")
+
+    @property
+    def axes(self) -> Vector:
+        """(3, 3), whose columns are the axes of the frame in EME2000."""
+        if self.epoch is None:
+            return attitude.frame_axes(self.frame)
+        from nutdamp.common.time import Epoch  # an epoch
+
+        return attitude.frame_axes(self.frame, Epoch.parse(self.epoch).days_of_j2000)
+
+    def seen_in(self, frame: str | None) -> Attitude:
+        """The same attitude in another frame; as it is where one of them has no name."""
+        if frame is None or self.frame in (None, frame):
+            return self
+        other = replace(self, frame=frame)
+        turn = attitude.from_matrix(other.axes.T @ self.axes)
+        return replace(other, quaternion=attitude.multiply(turn, self.quaternion))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -602,6 +627,29 @@ class Spacecraft(results.Data, results.Shown):
         return about, math.atan2(
             math.hypot(*direction[:2]), direction[2]
         ) if self.attitude is None else declination
+
+    def seen_in(self, frame: str) -> Spacecraft:
+        """The same spacecraft with its attitude and all directions in space in another frame."""
+        start, orbit, goal = self.attitude, self.orbit, self.goal
+        if start is None or start.frame in (None, frame):
+            return self
+        seen = start.seen_in(frame)
+        rotation = seen.axes.T @ start.axes
+
+        def turned(direction: Vector | None) -> Vector | None:
+            return None if direction is None else rotation @ direction
+
+        return replace(
+            self,
+            attitude=seen,
+            orbit=orbit
+            and replace(
+                orbit, position=rotation @ orbit.position, velocity=rotation @ orbit.velocity
+            ),
+            sun=turned(self.sun),
+            keep=tuple(replace(cone, direction=turned(cone.direction)) for cone in self.keep),
+            goal=replace(goal, axis=turned(goal.axis), sun=turned(goal.sun)),
+        )
 
     def utc(self, time: float, digits: int | None = None) -> str | None:
         """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp.errors import BadRequest, Unsuitable
@@ -103,16 +104,16 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
 
 def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
     """A format that needs epoch and frame, with a track to ``until`` s; messages are created now to
-    the second.
+    the second. The only place where directions leave the frame of the file: for one of `FRAMES`.
     """
     from nutdamp.common.time import Epoch
     from nutdamp.files.ccsds import message, write
     from nutdamp.files.export import reference, stk_attitude
     from nutdamp.flight.propagation import flown
 
-    # refuses a file without epoch or frame
-    spacecraft = plan.spacecraft
-    place = reference(plan.spacecraft)
+    place = reference(plan.spacecraft)  # refuses a file without epoch or frame
+    spacecraft = plan.spacecraft.seen_in(place.frame)
+    plan = replace(plan, spacecraft=spacecraft)
     last = until if row.track else plan.pulses.end
     if spacecraft.utc(last) is None:
         cure = "an earlier --until" if row.track else "a shorter horizon"

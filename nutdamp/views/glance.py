@@ -59,7 +59,12 @@ if TYPE_CHECKING:
 
 NOT = "✗"  # sign before a value above the requirement
 # names of angles of directions where there is little room
-SHORT_NAMES = {"right ascension": "RA", "declination": "dec"}
+SHORT_NAMES = {
+    "right ascension": "RA",
+    "declination": "dec",
+    "longitude": "lon",
+    "latitude": "lat",
+}
 
 
 def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:

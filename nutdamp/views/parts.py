@@ -506,9 +506,13 @@ def direction_columns(spacecraft: Spacecraft) -> tuple[Column, Column]:
             Column("tilt_deg", "tilt", "deg", other, pointing, "json"),
             Column("azimuth_deg", "azimuth", "deg", around, longitude, "json"),
         )
+    names = ("right ascension", "declination")
+    if spacecraft.attitude.ecliptic:
+        names = ("longitude", "latitude")
+    first, second = (f"{name.replace(' ', '_')}_deg" for name in names)
     return (
-        Column("right_ascension_deg", "right ascension", "deg", around, longitude, "json"),
-        Column("declination_deg", "declination", "deg", other, pointing, "json"),
+        Column(first, names[0], "deg", around, longitude, "json"),
+        Column(second, names[1], "deg", other, pointing, "json"),
     )
 
 

@@ -159,9 +159,10 @@ def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
     )
     if spacecraft.attitude is not None:
         frame = spacecraft.attitude.frame or "the frame of the file"
+        around, above = parts.direction_columns(spacecraft)
         west, east = (longitude(math.degrees(angle)) for angle in extremes.right_ascension)
-        yield "right ascension", f"{west} to {east} deg in {frame}, from its axis x towards y"
-        yield "declination", _range(extremes.declination)
+        yield around.heading, f"{west} to {east} deg in {frame}, from its axis x towards y"
+        yield above.heading, _range(extremes.declination)
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
     yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
 
@@ -178,6 +179,9 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
     flight, extremes = simulation.shown, simulation.extremes
     impulses, flown = simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
+    around, above = "right_ascension_deg", "declination_deg"
+    if attitude is not None:
+        around, above = (column.key for column in parts.direction_columns(flight.spacecraft))
     return {
         **decisions.heading(flight.spacecraft),
         "scheme": simulation.plan.scheme,
@@ -202,9 +206,9 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
             "x_deg": [*map(math.degrees, extremes.x)],
             "y_deg": [*map(math.degrees, extremes.y)],
             # Western and eastern end, for any range between.
-            "right_ascension_deg": attitude
+            around: attitude
             and [math.degrees(full_turn(angle)) for angle in extremes.right_ascension],
-            "declination_deg": attitude and [*map(math.degrees, extremes.declination)],
+            above: attitude and [*map(math.degrees, extremes.declination)],
         },
     }
 

@@ -687,12 +687,6 @@ def test_a_history_is_telemetry(tmp_path: Path) -> None:
     assert estimate.omega0 == pytest.approx(plan.spacecraft.omega0, abs=1e-4)
 
 
-def test_a_history_in_another_frame_is_no_telemetry(tmp_path: Path) -> None:
-    path, _ = exported(tmp_path, SPACECRAFT, "aem")
-    with pytest.raises(BadRequest, match="expected one frame"):
-        nutdamp.fit(path, nutdamp.read(SPACECRAFT.replace("EME2000", "GCRF")), ignored=print)
-
-
 @pytest.mark.parametrize(("old", "new", "problem"), [
     ("= QUATERNION/ANGVEL", "= SPIN/NUTATION", "is not read"),
     ("CCSDS_AEM_VERS = 2.0", "CCSDS_AEM_VERS = 1.0", "version"),
