@@ -192,7 +192,6 @@ def _holds_names(annotation: Any) -> bool:
 
 MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
 ALONG = 1e-3  # rad (0.06 deg) from the Sun, up to which the side of the Sun is not told
-POLE = 1e-9  # rad from a pole of the frame, up to which a spin axis has no ascending node
 
 
 def load_spacecraft(
@@ -464,10 +463,8 @@ def _attitude(
         along = inertia.momentum(omega0)
     body_axis = inertia.axes @ (along / np.linalg.norm(along))
     axis = attitude.on_sphere(*section.spin_axis)
-    side = np.cross([0.0, 0.0, 1.0], axis)
+    side = attitude.ascending_node(axis)
     phase = section.phase or 0.0
-    if np.linalg.norm(side) < POLE:
-        side = np.array([1.0, 0.0, 0.0])
     if section.sun_phase is not None:
         assert sunward is not None
         side = sunward
