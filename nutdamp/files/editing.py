@@ -420,8 +420,7 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     else:
         vector = tree.get("attitude", "of")
         of_momentum = vector is not None and vector.value == "momentum"
-        along = after.momentum if of_momentum else after.axis
-        axis = along / np.linalg.norm(along)
+        axis = attitude.unit(after.momentum) if of_momentum else after.axis
         first = attitude.rotate(turned.quaternion, np.array([1.0, 0.0, 0.0]))
         places: dict[KeyPath, float] = {
             ("spin_axis", 0): attitude.full_turn(math.atan2(axis[1], axis[0])),

@@ -879,6 +879,11 @@ class GoalSection(Section):
     declination: Declination | None = Field(
         "Declination of the target axis in the attitude's frame, rad.", "22 deg"
     )
+    sun_angle: Apart | None = Field(
+        "Angle of the target axis from the Sun, rad, 0 to 180 deg: the nearest such axis, on the "
+        "great circle through the Sun and the angular momentum at t = 0.",
+        "109 deg",
+    )
     spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
 
 

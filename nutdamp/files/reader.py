@@ -481,6 +481,9 @@ def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
         return Goal(spacecraft.direction_in_n(section.tilt, section.azimuth or 0.0), section.spin)
     if section.right_ascension is not None and section.declination is not None:
         return Goal(attitude.on_sphere(section.right_ascension, section.declination), section.spin)
+    if section.sun_angle is not None:
+        axis = spacecraft.at_sun_angle(section.sun_angle)
+        return Goal(axis, section.spin, sun_angle=section.sun_angle)
     return Goal(spin=section.spin)
 
 

@@ -97,6 +97,13 @@ RULES = (
     ("goal.declination", "completes", ".right_ascension", "names no direction"),
     ("goal.right_ascension", "completes", ".declination", "names no direction"),
     ("goal.right_ascension", "needs", "attitude", f"{POINTING}; without it give tilt and azimuth"),
+    (
+        "goal.sun_angle",
+        "beside",
+        ".tilt .azimuth .right_ascension .declination",
+        "keep one target",
+    ),
+    ("goal.sun_angle", "needs", "sun", SUN),
     ("goal.spin", "not zero", "rate", "expected a rate about axis 3"),
     (
         "requirement.probability",

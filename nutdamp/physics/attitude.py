@@ -191,6 +191,11 @@ def on_sphere(right_ascension: float, declination: float) -> Array:
     )
 
 
+def unit(vector: Array) -> Array:
+    """The vector (3,) at length 1."""
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
 def square_to(vector: Array) -> Array:
     """Some unit vector perpendicular to ``vector`` (3,)."""
     other = np.eye(3)[int(np.argmin(np.abs(vector)))]
