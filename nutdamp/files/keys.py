@@ -839,7 +839,14 @@ class RequirementSection(Section):
         "Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg"
     )
     momentum_shift: AcuteAngle | None = Field(
-        "Largest turn of the angular momentum, rad, above 0 and below 90 deg.", "0.2 deg"
+        "Largest turn of the angular momentum from t = 0, rad, above 0 and below 90 deg; "
+        "with a target give pointing.",
+        "0.2 deg",
+    )
+    pointing: AcuteAngle | None = Field(
+        "Largest angle of the angular momentum from the target, see goal, rad, "
+        "above 0 and below 90 deg.",
+        "0.2 deg",
     )
     nutation_during: AcuteAngle | None = Field(
         "Largest nutation angle on the way, rad, above 0 and below 90 deg: "

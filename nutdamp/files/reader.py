@@ -111,6 +111,7 @@ def _contents(
     name: str,
     settings: Sequence[Setting],
     warn: Warn,
+    aimed: bool,
 ) -> tuple[keys.SpacecraftFile, Node]:
     """The contents of a file without faults, and its tree."""
     root, faults = read_tree(text, name)
@@ -121,7 +122,7 @@ def _contents(
         faults += unplaced
     faulty = [*_spelling(root, keys.SpacecraftFile, ())]
     facts = Facts(root)
-    faulty += findings(facts)
+    faulty += findings(facts, aimed=aimed)
     problems: Problems = []
     contents = keys.SpacecraftFile.read(root.plain(), problems)
     unreadable = {path for path, _ in problems}
@@ -204,12 +205,17 @@ def load_spacecraft(
 
 
 def read_spacecraft(
-    text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None
+    text: str,
+    name: str,
+    settings: Sequence[Setting] = (),
+    warn: Warn = lambda _: None,
+    *,
+    aimed: bool = False,
 ) -> Spacecraft:
-    """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with
-    all faults.
+    """The spacecraft in the text of a file ``name``, with ``settings``; ``aimed``: its target is
+    given beside them. Raises `FaultyFile` with all faults.
     """
-    contents, root = _contents(text, name, settings, warn)
+    contents, root = _contents(text, name, settings, warn, aimed)
     stated = contents.inertia
     tensor = np.diag(np.array([stated.A, stated.A, stated.C], dtype=float))
     if stated.tensor is not None:
@@ -233,7 +239,13 @@ def read_spacecraft(
     torquer = steerable if thrusters else steerable or Steerable()
     required = contents.requirement
     asks_nothing = required is None or all(
-        bound is None for bound in (required.nutation, required.momentum_shift, required.spin)
+        bound is None
+        for bound in (
+            required.nutation,
+            required.momentum_shift,
+            required.pointing,
+            required.spin,
+        )
     )
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
@@ -282,13 +294,15 @@ class Source(NamedTuple):
     """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside
     it.
 
-    ``built_in``: the built-in example, since no file was named.
+    ``built_in``: the built-in example, since no file was named; ``aimed``: a target is given
+    beside it.
     """
 
     text: str
     name: str
     settings: tuple[Setting, ...] = ()
     built_in: bool = False
+    aimed: bool = False
 
     def read(
         self, doubt: Callable[[Fault], object] = lambda doubt: warn(doubt.as_warning)
@@ -297,7 +311,9 @@ class Source(NamedTuple):
         FaultyFile.
         """
         doubts: list[Fault] = []
-        spacecraft = read_spacecraft(self.text, self.name, self.settings, doubts.append)
+        spacecraft = read_spacecraft(
+            self.text, self.name, self.settings, doubts.append, aimed=self.aimed
+        )
         object.__setattr__(spacecraft, "built_in", self.built_in)
         for each in doubts:
             doubt(each)

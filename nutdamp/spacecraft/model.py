@@ -42,8 +42,8 @@ SLACK = 1e-9  # rad by which a bound of `Keep` may be passed: rounding
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """Requirement at the end: nutation angle and shift of the angular momentum, rad; None requires
-    nothing.
+    """Requirement at the end: nutation angle, shift of the angular momentum from t = 0 and its
+    angle from a target (``pointing``), rad; None requires nothing.
 
     ``probability`` (0 to 1) is how surely a dispersed flight must meet it; ``spin``: tolerance of
     the goal's spin.
@@ -53,6 +53,7 @@ class Requirement:
     momentum_shift: float | None = None
     probability: float | None = None
     spin: SpinTolerance | None = None
+    pointing: float | None = None
 
 
 PROBABILITY = 0.997  # share of cases that must comply where the requirement gives none

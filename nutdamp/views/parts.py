@@ -639,8 +639,6 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     bounds = required(spacecraft)
     if bounds:
         yield "requirement", bounds
-    if any(bound.part is Part.DISTANCE for bound in requirements.required(spacecraft)):
-        yield "", "momentum_shift bounds the axis error: the angle of H from the target"
 
 
 def changing(spacecraft: Spacecraft) -> list[str]:
