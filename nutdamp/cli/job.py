@@ -263,7 +263,8 @@ class Job:
             image.ending(plot)
         elif self.figure != self.usual:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
-        self.source = self.given.source(self.remark, self.doubt)
+        aimed = self.aim.target is not None or self.aim.sun_angle is not None
+        self.source = self.given.source(self.remark, self.doubt)._replace(aimed=aimed)
         spacecraft = self.source.read(lambda doubt: say(doubt.as_warning))
         self.spacecraft = (
             self.aim.applied(spacecraft, self.doubt)

@@ -194,6 +194,8 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
         "End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: "
         "10deg,45deg."
     )
+    from_sun = "Instead of --target: its angle from the Sun: 109deg."
+    command = option("--sun-angle", type=UnitType("angle"), metavar="ANGLE", help=from_sun)(command)
     return angles("--target", help=end)(command)
 
 
@@ -263,6 +265,7 @@ class Aim(NamedTuple):
     target: Angles | None = None
     spin: float | str | None = None
     sun: Angles | None = None
+    sun_angle: float | None = None
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -270,6 +273,8 @@ class Aim(NamedTuple):
         words = []
         if self.target is not None:
             words.append(f"--target={self.target.first!r}rad,{self.target.second!r}rad")
+        if self.sun_angle is not None:
+            words.append(f"--sun-angle={float(self.sun_angle)!r}rad")
         if self.spin is not None:
             words.append("--spin=keep" if self.spin == "keep" else f"--spin={self.spin!r}rad/s")
         return tuple(words)
@@ -278,7 +283,11 @@ class Aim(NamedTuple):
         """The spacecraft with this goal; a usage error where it has none, a doubt if unlikely."""
         goal = spacecraft.goal
         if self.target is not None:
-            goal = dataclasses.replace(goal, axis=_direction(spacecraft, self.target, "--target"))
+            axis = _direction(spacecraft, self.target, "--target")
+            goal = dataclasses.replace(goal, axis=axis, sun_angle=None)
+        if self.sun_angle is not None:
+            axis = _at_sun_angle(spacecraft, self)
+            goal = dataclasses.replace(goal, axis=axis, sun_angle=float(self.sun_angle))
         if self.sun is not None:
             goal = dataclasses.replace(goal, sun=_direction(spacecraft, self.sun, "--sun"))
         if self.spin is not None:
@@ -308,6 +317,23 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
         "declination of -90 deg to 90 deg" if in_sky else "tilt of at least 0 and below 180 deg"
     )
     raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
+
+
+def _at_sun_angle(spacecraft: Spacecraft, aim: Aim) -> Vector:
+    """The unit vector (3,) at an angle from the Sun; a usage error without, or with a target."""
+    angle = aim.sun_angle
+    assert angle is not None
+    problem = ""
+    if aim.target is not None:
+        problem = "given together with --target; keep one of the two"
+    elif not 0.0 <= angle <= math.pi:
+        readings = Angles(angle, 0.0).readings
+        problem = "; ".join(("expected an angle of 0 to 180 deg", *readings))
+    elif spacecraft.sun is None:
+        problem = "needs the key sun of the file: [right ascension, declination], or sun: epoch"
+    if problem:
+        raise click.BadParameter(problem, param_hint="--sun-angle")
+    return spacecraft.at_sun_angle(angle)
 
 
 def expect_read(

@@ -184,6 +184,63 @@ def carried(fitted: Fit, time: float) -> Carried:
     return Carried(time, names, *_told(fitted, inputs), *moving(fitted, time), tilt)
 
 
+class Pointing(NamedTuple):
+    """Inertial ``direction`` (3,), and the ``covariance`` (2, 2) rad² of its errors in right
+    ascension times cosine of declination, and in declination.
+    """
+
+    name: str
+    direction: Vector
+    covariance: Matrix
+    source: str
+
+    @property
+    def along(self) -> float:
+        """One sigma of right ascension times cosine of declination, rad."""
+        return math.sqrt(self.covariance[0, 0])
+
+    @property
+    def across(self) -> float:
+        """One sigma of declination, rad."""
+        return math.sqrt(self.covariance[1, 1])
+
+    @property
+    def correlation(self) -> float | None:
+        """Correlation of the two."""
+        sigmas = self.along * self.across
+        return float(self.covariance[0, 1]) / sigmas if sigmas > 0.0 else None
+
+
+def pointings(fitted: Fit, time: float) -> tuple[Pointing, ...]:
+    """Directions of spin axis and H at ``time`` s; none where the record does not show them."""
+    first = fitted.index("attitude_1")
+    if first is None:
+        return ()
+    prior = fitted.model.parameters[first].prior
+    of_tilts = fitted.covariance[first : first + 2, first : first + 2]
+    low, high = np.sqrt(np.maximum(np.linalg.eigvalsh(of_tilts), 0.0))
+    if low > FROM_DATA * prior:
+        return ()
+
+    def directions(values: Values) -> Vector:
+        body, state = fitted.model.at(values, time)
+        momentum = body.inertia.momentum(state.rates)
+        axes = np.array([[0.0, 0.0, body.sense], momentum / np.linalg.norm(momentum)])
+        return attitude.rotate(state.quaternion, axes).ravel()
+
+    vectors, covariance = _told(fitted, directions)
+    rows = []
+    for name, part in (("spin axis", slice(0, 3)), ("H", slice(3, 6))):
+        direction = vectors[part]
+        x, y, _ = direction.tolist()
+        east = np.array([-y, x, 0.0]) / math.hypot(x, y) if x or y else np.array([0.0, 1.0, 0.0])
+        across = np.stack([east, np.cross(direction, east)])
+        shared = across @ covariance[part, part] @ across.T
+        source = TOLD if high <= FROM_DATA * prior else SHARED
+        rows.append(Pointing(name, direction, shared, source))
+    return tuple(rows)
+
+
 def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
     """The body, and its motion at ``time`` s."""
     model = fitted.model

@@ -17,7 +17,7 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.views.parts import direction_columns
+from nutdamp.views.parts import by_the_sun, direction_columns
 from nutdamp.views.text import steering
 from nutdamp.views.verdict import stated
 
@@ -108,6 +108,7 @@ def title(flight: Flight) -> str:
             f"{column.heading} {column.shown(goal).rstrip('0').rstrip('.')}°"
             for column in direction_columns(spacecraft)
         )
+        target += by_the_sun(spacecraft)
         turn = f"H turned {style.angle(spacecraft.to_turn)} to the target, {target}\n"
     result = f"nutation {swings}{style.angle(spacecraft.nutation)} → {style.angle(left.nutation)}"
     return (

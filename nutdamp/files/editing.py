@@ -411,26 +411,42 @@ def epoch_after(epoch: str, time: float) -> str:
 
 def attitude_edits(tree: Node, later: Later) -> Edits:
     """Attitude, epoch and frame; nothing for a body without attitude."""
-    turned, old = later.after.attitude, later.before.attitude
+    after, old = later.after, later.before.attitude
+    if old is not None and old.frame is not None:  # the other directions of the file stay in it
+        after = after.seen_in(old.frame)
+    turned = after.attitude
     if turned is None:
         return
-    if old is not None:  # the other directions of the file stay in its frame
-        turned = turned.seen_in(old.frame)
-    parts = flow_list(turned.quaternion)
-    keys = {"quaternion": parts, "epoch": turned.epoch, "frame": turned.frame}
-    if (
-        tree.get("attitude", "quaternion") is None
-    ):  # none, or another form, which holds a direction alone
-        yield Edit(
-            ("attitude",),
-            "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}",
+    if tree.get("attitude", "spin_axis") is None:
+        keys = {"quaternion": flow_list(turned.quaternion)}
+    else:
+        vector = tree.get("attitude", "of")
+        of_momentum = vector is not None and vector.value == "momentum"
+        axis = attitude.unit(after.momentum) if of_momentum else after.axis
+        first = attitude.rotate(turned.quaternion, np.array([1.0, 0.0, 0.0]))
+        places: dict[KeyPath, float] = {
+            ("spin_axis", 0): attitude.full_turn(math.atan2(axis[1], axis[0])),
+            ("spin_axis", 1): math.atan2(axis[2], math.hypot(axis[0], axis[1])),
+            ("phase",): attitude.phase_about(first, axis, attitude.ascending_node(axis)),
+        }
+        ascension, declination, phase = (
+            as_before(tree.get("attitude", *path), angle, "angle") for path, angle in places.items()
         )
-        return
-    yield Edit(("attitude", "quaternion"), parts)
+        keys = {"spin_axis": f"[{ascension}, {declination}]", "phase": phase}
+        if of_momentum:
+            keys["of"] = "momentum"
     for key in ("epoch", "frame"):
-        value = keys[key]
+        value = getattr(turned, key)
         if value is not None and (old is None or value != getattr(old, key)):
-            yield Edit(("attitude", key), value)
+            keys[key] = value
+    # No attitude before, or from the side of the Sun, which may be elsewhere by now.
+    if tree.get("attitude") is None or tree.get("attitude", "sun_phase") is not None:
+        whole = keys | {key: getattr(turned, key) for key in ("epoch", "frame")}
+        entries = ", ".join(f"{key}: {value}" for key, value in whole.items() if value)
+        yield Edit(("attitude",), f"{{{entries}}}")
+        return
+    for key, value in keys.items():
+        yield Edit(("attitude", key), value)
 
 
 def carry_text(

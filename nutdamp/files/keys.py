@@ -841,7 +841,14 @@ class RequirementSection(Section):
         "Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg"
     )
     momentum_shift: AcuteAngle | None = Field(
-        "Largest turn of the angular momentum, rad, above 0 and below 90 deg.", "0.2 deg"
+        "Largest turn of the angular momentum from t = 0, rad, above 0 and below 90 deg; "
+        "with a target give pointing.",
+        "0.2 deg",
+    )
+    pointing: AcuteAngle | None = Field(
+        "Largest angle of the angular momentum from the target, see goal, rad, "
+        "above 0 and below 90 deg.",
+        "0.2 deg",
     )
     nutation_during: AcuteAngle | None = Field(
         "Largest nutation angle on the way, rad, above 0 and below 90 deg: "
@@ -880,6 +887,11 @@ class GoalSection(Section):
     )
     declination: Declination | None = Field(
         "Declination of the target axis in the attitude's frame, rad.", "22 deg"
+    )
+    sun_angle: Apart | None = Field(
+        "Angle of the target axis from the Sun, rad, 0 to 180 deg: the nearest such axis, on the "
+        "great circle through the Sun and the angular momentum at t = 0.",
+        "109 deg",
     )
     spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
 

@@ -111,6 +111,7 @@ def _contents(
     name: str,
     settings: Sequence[Setting],
     warn: Warn,
+    aimed: bool,
 ) -> tuple[keys.SpacecraftFile, Node]:
     """The contents of a file without faults, and its tree."""
     root, faults = read_tree(text, name)
@@ -121,7 +122,7 @@ def _contents(
         faults += unplaced
     faulty = [*_spelling(root, keys.SpacecraftFile, ())]
     facts = Facts(root)
-    faulty += findings(facts)
+    faulty += findings(facts, aimed=aimed)
     problems: Problems = []
     contents = keys.SpacecraftFile.read(root.plain(), problems)
     unreadable = {path for path, _ in problems}
@@ -192,7 +193,6 @@ def _holds_names(annotation: Any) -> bool:
 
 MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
 ALONG = 1e-3  # rad (0.06 deg) from the Sun, up to which the side of the Sun is not told
-POLE = 1e-9  # rad from a pole of the frame, up to which a spin axis has no ascending node
 
 
 def load_spacecraft(
@@ -205,12 +205,17 @@ def load_spacecraft(
 
 
 def read_spacecraft(
-    text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None
+    text: str,
+    name: str,
+    settings: Sequence[Setting] = (),
+    warn: Warn = lambda _: None,
+    *,
+    aimed: bool = False,
 ) -> Spacecraft:
-    """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with
-    all faults.
+    """The spacecraft in the text of a file ``name``, with ``settings``; ``aimed``: its target is
+    given beside them. Raises `FaultyFile` with all faults.
     """
-    contents, root = _contents(text, name, settings, warn)
+    contents, root = _contents(text, name, settings, warn, aimed)
     stated = contents.inertia
     tensor = np.diag(np.array([stated.A, stated.A, stated.C], dtype=float))
     if stated.tensor is not None:
@@ -234,7 +239,13 @@ def read_spacecraft(
     torquer = steerable if thrusters else steerable or Steerable()
     required = contents.requirement
     asks_nothing = required is None or all(
-        bound is None for bound in (required.nutation, required.momentum_shift, required.spin)
+        bound is None
+        for bound in (
+            required.nutation,
+            required.momentum_shift,
+            required.pointing,
+            required.spin,
+        )
     )
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
@@ -283,13 +294,15 @@ class Source(NamedTuple):
     """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside
     it.
 
-    ``built_in``: the built-in example, since no file was named.
+    ``built_in``: the built-in example, since no file was named; ``aimed``: a target is given
+    beside it.
     """
 
     text: str
     name: str
     settings: tuple[Setting, ...] = ()
     built_in: bool = False
+    aimed: bool = False
 
     def read(
         self, doubt: Callable[[Fault], object] = lambda doubt: warn(doubt.as_warning)
@@ -298,7 +311,9 @@ class Source(NamedTuple):
         FaultyFile.
         """
         doubts: list[Fault] = []
-        spacecraft = read_spacecraft(self.text, self.name, self.settings, doubts.append)
+        spacecraft = read_spacecraft(
+            self.text, self.name, self.settings, doubts.append, aimed=self.aimed
+        )
         object.__setattr__(spacecraft, "built_in", self.built_in)
         for each in doubts:
             doubt(each)
@@ -466,10 +481,8 @@ def _attitude(
         along = inertia.momentum(omega0)
     body_axis = inertia.axes @ (along / np.linalg.norm(along))
     axis = attitude.on_sphere(*section.spin_axis)
-    side = np.cross([0.0, 0.0, 1.0], axis)
+    side = attitude.ascending_node(axis)
     phase = section.phase or 0.0
-    if np.linalg.norm(side) < POLE:
-        side = np.array([1.0, 0.0, 0.0])
     if section.sun_phase is not None:
         assert sunward is not None
         side = sunward
@@ -486,6 +499,9 @@ def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
         return Goal(spacecraft.direction_in_n(section.tilt, section.azimuth or 0.0), section.spin)
     if section.right_ascension is not None and section.declination is not None:
         return Goal(attitude.on_sphere(section.right_ascension, section.declination), section.spin)
+    if section.sun_angle is not None:
+        axis = spacecraft.at_sun_angle(section.sun_angle)
+        return Goal(axis, section.spin, sun_angle=section.sun_angle)
     return Goal(spin=section.spin)
 
 

@@ -100,12 +100,25 @@ RULES = (
     ("goal.declination", "completes", ".right_ascension", "names no direction"),
     ("goal.right_ascension", "completes", ".declination", "names no direction"),
     ("goal.right_ascension", "needs", "attitude", f"{POINTING}; without it give tilt and azimuth"),
+    (
+        "goal.sun_angle",
+        "beside",
+        ".tilt .azimuth .right_ascension .declination",
+        "keep one target",
+    ),
+    ("goal.sun_angle", "needs", "sun", SUN),
     ("goal.spin", "not zero", "rate", "expected a rate about axis 3"),
     (
         "requirement.probability",
         "needs",
-        ".nutation|.momentum_shift|.spin",
+        ".nutation|.momentum_shift|.pointing|.spin",
         ", of which it is the share",
+    ),
+    (
+        "requirement.pointing",
+        "beside",
+        ".momentum_shift",
+        "pointing counts from the target, momentum_shift from t = 0; keep one of the two",
     ),
     ("limits.earliest", "below", ".horizon", "time"),
     ("limits.blackout.*.0", "at most", ".1", "time"),
@@ -331,8 +344,17 @@ def amount(kind: str, value: float) -> str:
     return bar(value) if kind == "pressure" else f"{value:g} {KINDS[kind].si}"
 
 
-def findings(facts: Facts) -> Iterator[Finding]:
-    """All faults of the table, and those of body, motion, thrusters and studies."""
+TARGETS = ("tilt", "right_ascension", "sun_angle")  # keys of goal that name a target
+
+
+def findings(facts: Facts, *, aimed: bool) -> Iterator[Finding]:
+    """All faults of the table, and those of body, motion, thrusters and studies; ``aimed``: a
+    target is given beside the file.
+    """
+    target = aimed or any(facts.has("goal", key) for key in TARGETS)
+    if facts.has("requirement", "pointing") and not target:
+        cure = "give goal or --target, or momentum_shift for the turn from t = 0"
+        yield Finding(("requirement", "pointing"), f"needs a target to count from; {cure}", True)
     for pattern, kind, others, cure in RULES:
         for path in facts.matching(pattern):
             yield from KINDS_OF_RULES[kind](facts, path, others, cure)
@@ -595,7 +617,7 @@ BANDS = (
         lambda value, _: abs(value) > TURN,
     ),
     Doubtful(
-        "requirement.momentum_shift requirement.nutation state.nutation",
+        "requirement.momentum_shift requirement.pointing requirement.nutation state.nutation",
         "angle",
         "deg",
         lambda value, _: LOOSE < value < 0.5 * math.pi,

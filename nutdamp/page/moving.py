@@ -65,12 +65,11 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
     """
     directions = []
     if spacecraft.goal.axis is not None:
-        shift = None if spacecraft.requirement is None else spacecraft.requirement.momentum_shift
-        circles = (
-            []
-            if shift is None
-            else [Circle(f"H at most {limit_text(shift)} from target", shift, "target")]
-        )
+        circles = [
+            Circle(f"H at most {limit_text(bound.limit)} from target", bound.limit, "target")
+            for bound in requirements.required(spacecraft)
+            if bound.part is Part.DISTANCE
+        ]
         directions.append(NamedDirection("target", spacecraft.goal.axis, "target", tuple(circles)))
     for keep in spacecraft.watched:
         if keep.direction is not None:
@@ -437,7 +436,7 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
     rows = [
         (
             part.value,
-            part.label,
+            requirements.BOUNDS.get(part, part.label),
             f"≤ {limit_text(limits[part]).removesuffix(' deg')}°" if part in limits else "",
         )
         for part in parts

@@ -61,6 +61,9 @@ def product(left: Iterable[Any], right: Iterable[Any]) -> tuple[Any, Any, Any, A
     )
 
 
+POLE = 1e-9  # rad from a pole of the frame, up to which an axis has no ascending node
+
+
 def rotate(quaternion: Array, vector: Array) -> Array:
     """Inertial components of a body vector, (..., 4) and (..., 3) -> (..., 3)."""
     # Written out: np.cross takes several times as long for a few vectors.
@@ -162,6 +165,23 @@ def about_axis(body_axis: Array, body_side: Array, axis: Array, side: Array, pha
     return from_matrix(frames[1] @ turn @ frames[0].T)
 
 
+def phase_about(towards: Array, axis: Array, side: Array) -> float:
+    """Angle, rad, about an inertial ``axis`` (3,) from a ``side`` to a direction (3,), both seen
+    along it: the phase of `about_axis`.
+    """
+    sine = np.dot(axis, np.cross(side, towards))
+    cosine = np.dot(side, towards) - np.dot(side, axis) * np.dot(towards, axis)
+    return math.atan2(sine, cosine)
+
+
+def ascending_node(axis: Array) -> Array:
+    """Direction (3,) of the ascending node of an inertial unit ``axis`` (3,): z × axis; x at a
+    pole.
+    """
+    node = np.array([-axis[1], axis[0], 0.0])
+    return node if np.linalg.norm(node) > POLE else np.array([1.0, 0.0, 0.0])
+
+
 def full_turn(angle: float) -> float:
     """Angle reduced to [0, 2π)."""
     turned = angle % (2.0 * math.pi)
@@ -189,6 +209,11 @@ def on_sphere(right_ascension: float, declination: float) -> Array:
             math.sin(declination),
         ]
     )
+
+
+def unit(vector: Array) -> Array:
+    """The vector (3,) at length 1."""
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def square_to(vector: Array) -> Array:

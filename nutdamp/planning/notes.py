@@ -123,6 +123,14 @@ def broken_cone(aspect: Aspect) -> Note:
     )
 
 
+def shift_notes(spacecraft: Spacecraft) -> Iterator[Note]:
+    """Note on a requirement.momentum_shift that counts from a target."""
+    requested = spacecraft.requirement
+    counted = requested is not None and requested.momentum_shift is not None
+    if counted and spacecraft.goal.axis is not None:
+        yield note("momentum-shift-of-target")
+
+
 def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iterator[Note]:
     """Notes beside the verdict on a plan; ``looped``: it is that of a closed loop, which goes on
     firing.
@@ -144,6 +152,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
         and spacecraft.requirement.spin is not None
     ):
         yield note("spin-required-without-goal")
+    yield from shift_notes(spacecraft)
     if verdict.empties:
         yield note("tank-empties")
     if verdict.met is False:

@@ -43,8 +43,8 @@ SLACK = 1e-9  # rad by which a bound of `Keep` may be passed: rounding
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """Requirement at the end: nutation angle and shift of the angular momentum, rad; None requires
-    nothing.
+    """Requirement at the end: nutation angle, shift of the angular momentum from t = 0 and its
+    angle from a target (``pointing``), rad; None requires nothing.
 
     ``probability`` (0 to 1) is how surely a dispersed flight must meet it; ``spin``: tolerance of
     the goal's spin.
@@ -54,6 +54,7 @@ class Requirement:
     momentum_shift: float | None = None
     probability: float | None = None
     spin: SpinTolerance | None = None
+    pointing: float | None = None
 
 
 PROBABILITY = 0.997  # share of cases that must comply where the requirement gives none
@@ -72,12 +73,14 @@ class Goal:
     ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis
     are to lie; None is where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed;
     None takes it as it comes. ``sun`` (3,) is the inertial direction by which a train of pulses
-    keeps its phase; None is along the great circle to ``axis``.
+    keeps its phase; None is along the great circle to ``axis``. ``sun_angle``: angle of ``axis``
+    from the Sun, rad, where it was asked for so.
     """
 
     axis: Vector | None = None
     spin: float | None = None
     sun: Vector | None = None
+    sun_angle: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -615,6 +618,18 @@ class Spacecraft(results.Data, results.Shown):
         body_to_n = replace(self, attitude=None).initial.quaternion
         in_body = attitude.matrix(body_to_n).T @ in_n
         return attitude.rotate(self.initial.quaternion, in_body)
+
+    def at_sun_angle(self, angle: float) -> Vector:
+        """Inertial unit vector (3,) ``angle`` rad from the Sun, of these the nearest to H at t = 0.
+
+        With H along the Sun, or opposite, all are as near: then on the side of the frame's north.
+        """
+        sun = self.sun
+        assert sun is not None
+        side = np.cross(np.cross(sun, attitude.unit(self.momentum)), sun)
+        if np.linalg.norm(side) < attitude.POLE:
+            side = np.cross(sun, attitude.ascending_node(sun))
+        return np.asarray(math.cos(angle) * sun + math.sin(angle) * attitude.unit(side))
 
     def angles_of(self, direction: Vector) -> tuple[float | None, float]:
         """Angles of an inertial ``direction`` (3,), rad.

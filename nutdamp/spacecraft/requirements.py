@@ -45,6 +45,7 @@ class Part(Enum):
         return LABELS.get(self, self.value.replace("_", " "))
 
 
+BOUNDS = {Part.DISTANCE: "pointing"}  # names of bounds that are not those of their parts
 LABELS = {Part.SPIN: "spin error", Part.DURING: "nutation on the way"}
 
 
@@ -66,7 +67,8 @@ class Bound(NamedTuple):
     def label(self) -> str:
         """Name in texts."""
         named = self.part is Part.CONE and self.keep is not None
-        return f"axis from {self.keep.name}" if named and self.keep else self.part.label
+        label = BOUNDS.get(self.part, self.part.label)
+        return f"axis from {self.keep.name}" if named and self.keep else label
 
     def met(self, value: Any) -> Any:
         """True where a value keeps the bound: numbers, or arrays over cases."""
@@ -142,8 +144,10 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     bounds = []
     if requested is not None and requested.nutation is not None:
         bounds.append(Bound(Part.NUTATION, requested.nutation, True))
-    if requested is not None and requested.momentum_shift is not None:
-        bounds.append(Bound(aim(spacecraft), requested.momentum_shift, True))
+    # For this version momentum_shift counts from a target, too, as pointing does.
+    for limit in () if requested is None else (requested.momentum_shift, requested.pointing):
+        if limit is not None:
+            bounds.append(Bound(aim(spacecraft), limit, True))
     if goal.spin is not None:
         bounds.append(Bound(Part.SPIN, spin_tolerance(spacecraft, goal.spin), True))
     return tuple(bounds)

@@ -23,6 +23,7 @@ from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
+from nutdamp.planning.notes import shift_notes
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
@@ -277,6 +278,7 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
 
 def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
     """Notes on a valid file; ``verbose``: disturbances stand in a table."""
+    yield from shift_notes(spacecraft)
     clock = capability.sun_clock(spacecraft)
     dispersions = spacecraft.dispersions
     if spacecraft.utc(0.0) is not None and spacecraft.utc(spacecraft.horizon) is None:

@@ -145,7 +145,11 @@ def target_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
     axis, spin = spacecraft.goal.axis, spacecraft.goal.spin
     if axis is None and spin is None:
         return None
-    return {"axis": None if axis is None else direction_json(spacecraft, axis), "spin_rad_s": spin}
+    return {
+        "axis": None if axis is None else direction_json(spacecraft, axis),
+        **values_of(spacecraft.goal, "sun_angle_deg"),
+        "spin_rad_s": spin,
+    }
 
 
 def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:

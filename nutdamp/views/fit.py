@@ -19,18 +19,20 @@ from nutdamp.estimation.results import (
     Carried,
     Estimate,
     Fitted,
+    Pointing,
     carried,
     correlated,
     doubts,
     estimates,
+    pointings,
 )
 from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import heading
-from nutdamp.views.parts import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, values_of
-from nutdamp.views.text import note_json
+from nutdamp.views.parts import direction_columns, opening, summary
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
+from nutdamp.views.text import fixed, note_json
 
 NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
 MOST_PAIRS = 6  # largest number of correlations named
@@ -115,6 +117,27 @@ ESTIMATES = (
 )
 
 
+def pointing_table(fit: Fit, time: float) -> DataTable:
+    """Directions of spin axis and H at ``time`` s; no rows where the record shows none."""
+    angles = [
+        column._replace(value=partial(_of_direction, column), where="screen json")
+        for column in direction_columns(fit.model.spacecraft)
+    ]
+    digits = to_figures(2)
+    sigmas = (
+        Column.named("sigma_along_deg=along", "sigma along", "deg", digits, "screen json"),
+        Column.named("sigma_across_deg=across", "sigma across", "deg", digits, "screen json"),
+        Column.named("correlation", "correlation", "", partial(fixed, digits=2), "screen json"),
+        Column.named("from=source", "from", "", where="screen json", kind=TEXT),
+    )
+    name = Column.named("direction=name", "direction", "", where="screen json", kind=TEXT)
+    return DataTable("Pointing", (name, *angles, *sigmas), pointings(fit, time))
+
+
+def _of_direction(column: Column, row: Pointing) -> Any:
+    return column.value(row.direction)
+
+
 def signal_table(fit: Fit) -> DataTable:
     """The signals of the record, counted from 0, with the test of their residuals."""
     of_signal = [fit.model.signal == at for at in range(len(fit.model.signals))]
@@ -183,8 +206,12 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), what)
     head = [*opening(spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
     table = DataTable("Estimates", ESTIMATES, rows)
+    head.append(Text(f"motion at t = {time:g} s"))
+    directions = pointing_table(fit, time)
+    if directions.rows:
+        head.append(directions.screen("screen"))
     return summary(
-        [*head, Text(f"motion at t = {time:g} s")],
+        head,
         lambda first=None: table.screen("screen", first=first and max(first, 3)),
         [*told(fit, rows)],
         "-o now.yaml · --plot fit.png",
@@ -196,7 +223,7 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
 def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
     """Parameters that the data do not determine, or only together, and unexpected estimates."""
     yield from doubts(fit)
-    yield from untold(fit.model.record)
+    yield from _untold(fit)
     of_file = [estimate.label for estimate in rows if estimate.source == UNTOLD]
     if of_file:
         yield note("fit-kept", estimates=", ".join(of_file))
@@ -210,6 +237,12 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
         yield note("correlated-inputs", inputs=", ".join(tied))
     if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:
         yield note("fit-one-moment")
+
+
+def _untold(fit: Fit) -> Iterator[Note]:
+    yield from untold(fit.model.record)
+    if not pointings(fit, fit.model.start):
+        yield note("fit-axis-of-file", signals=", ".join(fit.model.signals))
 
 
 def fit_json(fitted: Fitted, at_time: Carried) -> dict[str, Any]:
@@ -226,6 +259,7 @@ def fit_json(fitted: Fitted, at_time: Carried) -> dict[str, Any]:
             "signals": signal_table(fit).json(),
         },
         "time_s": at_time.time,
+        "pointing": pointing_table(fit, at_time.time).json(),
         "estimates": DataTable("Estimates", ESTIMATES, estimates(fit, at_time.time)).json(),
         "kept": list(fit.kept),
         "parameters": [parameter.name for parameter in model.parameters],
@@ -238,7 +272,7 @@ def fit_json(fitted: Fitted, at_time: Carried) -> dict[str, Any]:
             note_json(entry)
             for entry in (
                 *(note("record-read", warning=warning) for warning in fitted.warnings),
-                *(*doubts(fit), *untold(model.record), *notes(fit, at_time)),
+                *(*doubts(fit), *_untold(fit), *notes(fit, at_time)),
             )
         ],
     }

@@ -115,10 +115,7 @@ def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, st
     yield "H ends at", parts.direction_text(spacecraft, final.momentum)
     if spacecraft.goal.axis is not None:
         off = degrees(flown.residual.axis_error)
-        yield (
-            "target",
-            f"{parts.direction_text(spacecraft, spacecraft.goal.axis)}; H ends {off} off",
-        )
+        yield "target", f"{parts.target_text(spacecraft)}; H ends {off} off"
     yield "final state", f"spin {parts.spin_text(final.spin)}, nutation {degrees(final.nutation)}"
     if lasting(flown):
         yield "", lasting(flown)
@@ -375,6 +372,7 @@ def ends(plan: Plan) -> Table:
         momentum = f"turned by {short_angle(residual.momentum_shift, turn)} deg"
     else:
         momentum = f"{short_angle(residual.axis_error, turn)} deg off target"
+        momentum += parts.by_the_sun(spacecraft)
     final = flight.final.spin
     spin = "" if requirements.spins_at(spacecraft, final) else f"; spin {final * RPM:.5g} rpm"
     rows.append(("axis", f"{axis}; H {momentum}{spin}"))

@@ -523,6 +523,18 @@ def direction_text(spacecraft: Spacecraft, direction: Vector) -> str:
     )
 
 
+def target_text(spacecraft: Spacecraft) -> str:
+    """The target axis, and its angle from the Sun where it was asked for so."""
+    assert spacecraft.goal.axis is not None
+    return f"{direction_text(spacecraft, spacecraft.goal.axis)}{by_the_sun(spacecraft)}"
+
+
+def by_the_sun(spacecraft: Spacecraft) -> str:
+    """Clause on the Sun angle of a target that was asked for so; else empty."""
+    angle = spacecraft.goal.sun_angle
+    return "" if angle is None else f", Sun angle {degrees(angle)}"
+
+
 def spin_text(spin: float) -> str:
     """A spin rate given in rad/s, in rpm too."""
     return f"{spin * RPM:.6g} rpm ({quantity(spin, 'rad/s')})"
@@ -615,7 +627,7 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
         turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
         bound = "" if beyond else ", the least to turn H"
-        yield "target", direction_text(spacecraft, spacecraft.goal.axis)
+        yield "target", target_text(spacecraft)
         yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{bound}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
@@ -631,8 +643,6 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     bounds = required(spacecraft)
     if bounds:
         yield "requirement", bounds
-    if any(bound.part is Part.DISTANCE for bound in requirements.required(spacecraft)):
-        yield "", "momentum_shift bounds the axis error: the angle of H from the target"
 
 
 def changing(spacecraft: Spacecraft) -> list[str]:

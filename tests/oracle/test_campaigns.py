@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from support.builders import one_of, present
+from support import reference
+from support.builders import Outcome, one_of, present
 from support.cases import deep, spread, weekly
 from support.commands import rows as rows_of
 from support.process import Run
@@ -38,6 +39,29 @@ def at_rest(name: str, rpm: float) -> Spacecraft:
 
 def flown(body: Spacecraft, *blocks: Block) -> propagation.Flight:
     return propagation.flown(body, fired(body, blocks))
+
+
+# --- Cluster
+# ------------------------------------------------------------------------------------------------
+
+
+def test_cluster_slews_from_86_to_109_deg_of_the_sun_in_230_pulses_or_fewer() -> None:
+    """As flown: each pulse of the train in its own spin turn; by DOP853 H ends at 109 deg."""
+    keys = {
+        "attitude": {"spin_axis": ["10 deg", "-86 deg"], "of": "momentum"},
+        "sun": ["10 deg", 0],
+        "goal": {"sun_angle": "109 deg"},
+        "limits": {"horizon": "1000 s"},
+    }
+    spacecraft = nutdamp.example("cluster").with_(**keys)
+    sun = present(spacecraft.sun)
+    assert math.degrees(reference.angle(spacecraft.momentum, sun)) == pytest.approx(86.0, abs=1e-9)
+    assert math.degrees(spacecraft.to_turn) == pytest.approx(23.0, abs=1e-9)
+    plan = nutdamp.plan(spacecraft, "rhumb-line")
+    assert len(plan.pulses) <= 230
+    ended = Outcome(spacecraft, plan.pulses)
+    assert math.degrees(reference.angle(ended.momentum, sun)) == pytest.approx(109.0, abs=1e-3)
+    assert math.degrees(ended.nutation) < 0.1
 
 
 # --- Lunar Prospector

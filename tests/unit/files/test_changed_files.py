@@ -811,10 +811,22 @@ def test_at_a_pole_the_phase_counts_from_x(dec: float) -> None:
     )
 
 
-def test_a_file_carried_on_holds_a_quaternion_instead() -> None:
-    spacecraft = body("spin_axis: [120 deg, -15 deg], phase: 20 deg, epoch: 2026-03-01T12:00:00Z")
-    carried = nutdamp.plan(spacecraft, "none").carried(10.0)
-    flight = nutdamp.plan(spacecraft, "none").fly(10.0).track
-    turned = attitude.multiply(attitude.conjugate(quaternion(carried)), flight.quaternion[-1])
+@pytest.mark.parametrize(
+    "of", ["phase: 20 deg", "phase: 20 deg, of: momentum", "sun_phase: 20 deg"]
+)
+@pytest.mark.parametrize("inertia", [SYMMETRIC, TENSOR])
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+def test_a_file_carried_on_holds_spin_axis_and_phase(of: str, inertia: str, spin: float) -> None:
+    """A phase from the side of the Sun becomes one from the ascending node."""
+    keys = f"spin_axis: [120 deg, -15 deg], {of}, epoch: 2026-03-01T12:00:00Z"
+    spacecraft = body(keys, spin=spin, inertia=inertia, more="sun: epoch")
+    plan = nutdamp.plan(spacecraft, "none")
+    carried = plan.carried(10.0)
+    flown = plan.fly(10.0).track.quaternion[-1]
+    turned = attitude.multiply(attitude.conjugate(quaternion(carried)), flown)
     assert np.linalg.norm(turned[1:]) < 1e-10
+    assert isinstance(carried.source, Source)
+    words = set(carried.source.text.replace("{", " ").replace("[", " ").split())
+    assert {"spin_axis:", "phase:"} <= words
+    assert words.isdisjoint({"quaternion:", "sun_phase:"})
     assert present(carried.attitude).epoch == "2026-03-01T12:00:10Z"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import reference
 from support.builders import channel, fan, judged, present, spinner
 
 import nutdamp
@@ -16,6 +17,7 @@ from nutdamp.files.carried import later
 from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.propagation import flown
 from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.physics import attitude
 from nutdamp.spacecraft.constraints import (
     Windows,
     commandable,
@@ -25,7 +27,7 @@ from nutdamp.spacecraft.constraints import (
     rooms,
 )
 from nutdamp.spacecraft.equipment import Steerable
-from nutdamp.spacecraft.model import SLACK, Goal, Keep, Limits, Requirement
+from nutdamp.spacecraft.model import SLACK, Attitude, Goal, Keep, Limits, Requirement
 from nutdamp.spacecraft.requirements import (
     AIMED_SPIN,
     Bound,
@@ -352,3 +354,44 @@ def test_a_spin_is_required_within_one_percent_of_the_goal_unless_the_file_says_
         near = replace(body, omega0=np.array([0.0, 0.0, goal + off * AIMED_SPIN * size]))
         assert goal == 0.0 or spins_at(near, goal) is meets
     assert spin_tolerance(replace(body, requirement=None), 5.0) == 0.05
+
+
+# --- goal by the Sun
+
+
+@given(st.floats(0.0, 1.0), st.integers(0, 1000))
+def test_no_axis_at_a_sun_angle_is_nearer_than_that_on_the_great_circle(
+    share: float, seed: int
+) -> None:
+    """Brute force over the cone, in steps of a quarter of a degree."""
+    draw = np.random.default_rng(seed)
+    sun, north = draw.normal(size=(2, 3))
+    sun /= np.linalg.norm(sun)
+    angle = math.pi * share
+    body = replace(spinner(), attitude=Attitude(attitude.unit(draw.normal(size=4))), sun=sun)
+    axis = body.at_sun_angle(angle)
+    assert np.linalg.norm(axis) == pytest.approx(1.0, abs=1e-14)
+    assert reference.angle(axis, sun) == pytest.approx(angle, abs=1e-7)
+    across = attitude.unit(np.cross(sun, north))
+    about = np.linspace(0.0, 2.0 * math.pi, 1441)[:, None]
+    around = np.cos(about) * across + np.sin(about) * np.cross(sun, across)
+    cone = math.cos(angle) * sun + math.sin(angle) * around
+    momentum = attitude.unit(body.momentum)
+    assert momentum @ axis >= (cone @ momentum).max() - 1e-14
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("sun", "side"),
+    [([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0])],
+)
+def test_with_h_along_the_sun_the_axis_goes_north(
+    way: float, sun: list[float], side: list[float]
+) -> None:
+    body = spinner()
+    along = attitude.unit(body.inertia.momentum(body.omega0))
+    towards = way * np.array(sun)
+    turn = attitude.about_axis(along, np.array([1.0, 0, 0]), towards, np.array([0, 1.0, 0]), 0.3)
+    body = replace(body, attitude=Attitude(turn), sun=np.array(sun))
+    expected = math.cos(1.0) * np.array(sun) + math.sin(1.0) * np.array(side)
+    assert body.at_sun_angle(1.0) == pytest.approx(expected, abs=1e-12)
