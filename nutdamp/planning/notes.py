@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
 from nutdamp.flight.propagation import Flight
+from nutdamp.physics import body as rigid_body
 from nutdamp.planning.decision import ROBUST, TIES, Comparison, Gain, Ground
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
@@ -27,6 +28,15 @@ TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there
 
 
 TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
+
+
+def spacecraft_notes(spacecraft: Spacecraft) -> Iterator[Note]:
+    """Notes on a spacecraft that hold before any plan and for each."""
+    tilt = rigid_body.principal_tilt(spacecraft.inertia.axes)
+    damped = next(one for one in requirements.bounds(spacecraft) if one.part is Part.NUTATION)
+    if not damped.met(tilt):
+        limit = math.degrees(damped.limit)
+        yield note("principal-axis-off", tilt_deg=math.degrees(tilt), limit_deg=limit)
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
