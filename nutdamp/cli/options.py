@@ -190,10 +190,7 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
     rate = UnitType("rate", keep="keep")
     spin = "Final spin rate, such as 30rpm; optimal can set it."
     command = option("--spin", type=rate, metavar="RATE|keep", help=spin)(command)
-    end = (
-        "End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: "
-        "10deg,45deg."
-    )
+    end = "Axis at the end: RA,DEC; no attitude: tilt,azimuth."
     from_sun = "Instead of --target: its angle from the Sun: 109deg."
     command = option("--sun-angle", type=UnitType("angle"), metavar="ANGLE", help=from_sun)(command)
     return angles("--target", help=end)(command)

@@ -9,6 +9,7 @@ where I1 = I2.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,6 +27,7 @@ from nutdamp.spacecraft.constraints import (
     effective_on_times,
     longest_useful,
     usable,
+    without_waste,
 )
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop
 from nutdamp.spacecraft.model import Spacecraft
@@ -78,7 +80,31 @@ class Law:
         self.gauge: tuple[float, float] = (first, second)
         self.slope, self._offset = inertia.linear_rate(spacecraft.spin)
         self.period, self.growth = spacecraft.body_period, spacecraft.growth
-        self.actuators = tuple(map(self._actuator, at_hand(spacecraft, usable(spacecraft))))
+        channels = at_hand(spacecraft, usable(spacecraft))
+        thrifty = tuple(map(self._actuator, without_waste(spacecraft, channels)))
+        enough = len(thrifty) == len(channels) or self._in_time(thrifty)
+        self.actuators = thrifty if enough else tuple(map(self._actuator, channels))
+
+    def _in_time(self, actuators: Sequence[Actuator]) -> bool:
+        """True if their firings in each nutation period outdo growth, and end within the
+        horizon.
+        """
+        spin = self.spacecraft.spin
+        size = self.size(max(self.loop.start, self.spacecraft.nutation), spin)
+        firings = [self.firing(actuator, complex(size), spin) for actuator in actuators]
+        ready = -math.inf
+        removed = 0.0
+        for firing in sorted(filter(None, firings), key=lambda firing: firing.wait):
+            if firing.wait >= ready:  # else one before it is still on
+                removed += abs(firing.acts)
+                ready = firing.wait + firing.lasts + self.spacecraft.limits.gap
+        pull = removed / max(self.period, self.spacecraft.limits.gap)
+        grows = self.growth * size / pull if pull > 0.0 else math.inf
+        # ∫ d|z| / (pull - κ|z|) up to size; over size / pull it is -ln(1 - x) / x of x = grows.
+        if grows >= 1.0:
+            return False
+        longer = -math.log1p(-grows) / grows if grows else 1.0
+        return size / pull * longer <= self.spacecraft.horizon
 
     def _actuator(self, channel: Channel) -> Actuator:
         first, second, third = self.inertia.moments

@@ -135,17 +135,6 @@ def _complying(cases: Cases) -> float:
     return (cases.complying or 0.0) if cases.final else cases.low
 
 
-def spent(plan: Plan, least: str, unit: str) -> float:
-    """Amount of what is saved that a plan takes: propellant or impulse, in ``unit``, its end, s, or
-    pulses.
-    """
-    if least == "time":
-        return plan.pulses.end
-    if least == "pulses":
-        return float(len(plan.pulses))
-    return plan.pulses.total_impulse if least == "impulse" else plan.pulses.cost_in(unit)
-
-
 def cheapest(
     plans: Sequence[Plan], usual: Plan | None = None, least: str = catalogue.LEAST[0]
 ) -> tuple[Plan, Ground]:
@@ -159,8 +148,8 @@ def cheapest(
     if len(plans) == 1:
         return plans[0], Ground.ONLY
     unit = _unit(plans)
-    fewest = min(spent(plan, least, unit) for plan in plans)
-    equal = [plan for plan in plans if spent(plan, least, unit) <= fewest * (1.0 + SAME_COST)]
+    fewest = min(plan.pulses.spent(least, unit) for plan in plans)
+    equal = [plan for plan in plans if plan.pulses.spent(least, unit) <= fewest * (1.0 + SAME_COST)]
     if len(equal) > 1 and least != catalogue.LEAST[0]:
         fewest = min(plan.pulses.cost_in(unit) for plan in equal)
         equal = [plan for plan in equal if plan.pulses.cost_in(unit) <= fewest * (1.0 + SAME_COST)]
@@ -387,10 +376,14 @@ class Comparison(results.Data, results.Tabled):
         """
         feasible = [plan for plan in self.plans if plan.feasible]
         unit = _unit(feasible)
-        most = spent(chosen, self.least, unit) * (1.0 - SAME_COST)
+        most = chosen.pulses.spent(self.least, unit) * (1.0 - SAME_COST)
         for other in feasible:
             why = self.shortcoming(other)
-            if other is not chosen and spent(other, self.least, unit) < most and why is not None:
+            if (
+                other is not chosen
+                and other.pulses.spent(self.least, unit) < most
+                and why is not None
+            ):
                 yield Cheaper(other.scheme, other.pulses, why)
 
     def shortcoming(self, plan: Plan) -> Note | None:

@@ -14,12 +14,14 @@ import numpy as np
 from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
 from nutdamp.flight.propagation import Flight
+from nutdamp.physics import body as rigid_body
 from nutdamp.planning.decision import ROBUST, TIES, Comparison, Gain, Ground
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import WASTEFUL, worths
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 
@@ -30,6 +32,37 @@ TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there
 
 
 TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
+
+# Angle between torques, rad, up to which channels push alike: pulses of four-pulse, T_ω/8 long,
+# then overlap by half or more. Pairs mounted for two pulses are farther apart: 45° at C = 4A/3.
+ALIKE = math.pi * catalogue.DEFAULT_SHARE
+
+
+def spacecraft_notes(spacecraft: Spacecraft) -> Iterator[Note]:
+    """Notes on a spacecraft that hold before any plan and for each."""
+    tilt = rigid_body.principal_tilt(spacecraft.inertia.axes)
+    damped = next(one for one in requirements.bounds(spacecraft) if one.part is Part.NUTATION)
+    if not damped.met(tilt):
+        limit = math.degrees(damped.limit)
+        yield note("principal-axis-off", tilt_deg=math.degrees(tilt), limit_deg=limit)
+    channels = [channel for channel in spacecraft.channels if channel.damps]
+    pushes = np.array([channel.transverse / abs(channel.transverse) for channel in channels])
+    names = ", ".join(channel.name for channel in channels)
+    if len(channels) > 1 and np.outer(pushes, pushes.conj()).real.min() >= math.cos(ALIKE):
+        yield note("channels-push-alike", channels=names, period_s=spacecraft.body_period)
+    shares = worths(spacecraft, channels) if channels else []
+    wasting = [
+        (channel.name, share)
+        for channel, share in zip(channels, shares, strict=True)
+        if share < WASTEFUL
+    ]
+    if wasting:
+        yield note(
+            "channels-waste",
+            channels=", ".join(name for name, _ in wasting),
+            worth_percent=100.0 * max(share for _, share in wasting),
+            best=channels[shares.index(1.0)].name,
+        )
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:

@@ -56,6 +56,7 @@ class OptionKind:
 FLAG = OptionKind("True or False", none=False)
 COUNT = OptionKind("a whole number of at least 1", least=1)
 TIME = OptionKind("a time above zero, in s", "time")
+SAVED = OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False)
 ANGLE = OptionKind("an angle of at least 0, in rad", "angle")
 
 
@@ -120,6 +121,7 @@ class FourPulseOptions(SchemeOptions):
     """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
 
     on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
+    least: str = _option(LEAST[0], SAVED, "What to save.")
     coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.", as_is=True)
 
 
@@ -161,9 +163,7 @@ class OptimalOptions(SchemeOptions):
     else.
     """
 
-    least: str = _option(
-        LEAST[0], OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False), "What to save."
-    )
+    least: str = _option(LEAST[0], SAVED, "What to save.")
     free_axis: bool | None = _option(
         None, dataclasses.replace(FLAG, none=True), "Let H end anywhere."
     )

@@ -5,6 +5,7 @@ T_ω/4.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,18 @@ from nutdamp.errors import Infeasible, span
 from nutdamp.flight import propagation
 from nutdamp.schemes.catalogue import DEFAULT_SHARE, FourPulseOptions
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
-from nutdamp.spacecraft.constraints import Windows, usable
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import Windows, usable, without_waste
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
+if TYPE_CHECKING:
+    from nutdamp.schemes.valve_commands import FlownBuilder
+
+# share of the nutation allowed that channels left out may leave: the tolerances need the other half
+FILLED = 0.5
 MOST_FLOWN = 200  # pulses that are laid one by one on the true motion, at most
 
 
@@ -26,34 +34,63 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
 
     Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at
     most J_min/(2A) where the rest is below the smallest pulse. The sign rule holds for both signs
-    of a ω3. Raises Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a
-    channel's bounds.
+    of a ω3. Channels that waste fire only what the others leave, unless that misses the nutation
+    required or takes more of ``options.least``. Raises Infeasible where no pulse fits or helps, or
+    ``options.on_time`` is not within a channel's bounds.
     """
     channels = at_hand(spacecraft, usable(spacecraft))
+    thrifty = without_waste(spacecraft, channels)
+    if spacecraft.nutation_rate == 0.0:
+        builder = ImpulseBuilder(spacecraft)
+        fire_components(builder, channels, options.on_time, coarse=options.coarse)
+        builders = [builder]
+    else:
+        builders = [_fired(spacecraft, options, channels, channels)]
+        if len(thrifty) < len(channels):
+            builders.insert(0, _fired(spacecraft, options, thrifty, channels))
+    laid = [builder for builder in builders if builder.pulses]
+    if not laid:
+        raise no_alignment(spacecraft, channels)
+    enough = [builder.schedule() for builder in laid if _suffices(spacecraft, builder.nutation)]
+    if enough:
+        return min(enough, key=lambda schedule: schedule.spent(options.least))
+    return min(laid, key=lambda builder: builder.left).schedule()
+
+
+def _fired(
+    spacecraft: Spacecraft,
+    options: FourPulseOptions,
+    first: list[Channel],
+    channels: list[Channel],
+) -> ImpulseBuilder:
+    """Pulses of the channels that are ``first``, then of all where those leave too much."""
     builder = ImpulseBuilder(spacecraft)
     on_times = {
         channel.name: _on_time(builder.period, channel, options.on_time) for channel in channels
     }
-    turns = spacecraft.nutation_rate != 0.0
-    if not turns:
-        fire_components(builder, channels, options.on_time, coarse=options.coarse)
-    while (
-        turns and not builder.full and not builder.settled
-    ):  # whichever helpful channel comes first
-        pulses = []
-        for channel in channels:  # a full one, or in fine damping one of the remaining size
-            full = on_times[channel.name]
-            just_enough = (
-                None if options.coarse else builder.on_time_for(channel, builder.left, full)
-            )
-            pulses.append(builder.align(channel, full if just_enough is None else just_enough))
-        helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
-        if not helpful:
+    for firing in (first, channels):
+        enough = options.coarse and _suffices(spacecraft, builder.nutation)
+        if builder.pulses and enough:
             break
-        builder.fire(min(helpful, key=lambda pulse: pulse.t))
-    if not builder.pulses:
-        raise no_alignment(spacecraft, channels)
-    return builder.schedule()
+        while not builder.full and not builder.settled:  # whichever helpful channel comes first
+            pulses = []
+            for channel in firing:  # a full one, or in fine damping one of the remaining size
+                full = on_times[channel.name]
+                just_enough = (
+                    None if options.coarse else builder.on_time_for(channel, builder.left, full)
+                )
+                pulses.append(builder.align(channel, full if just_enough is None else just_enough))
+            helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
+            if not helpful:
+                break
+            builder.fire(min(helpful, key=lambda pulse: pulse.t))
+    return builder
+
+
+def _suffices(spacecraft: Spacecraft, nutation: float) -> bool:
+    """True if a ``nutation`` (rad) uses no more than `FILLED` of what is allowed at the end."""
+    bounds = requirements.bounds(spacecraft)
+    return all(bound.met(nutation / FILLED) for bound in bounds if bound.part is Part.NUTATION)
 
 
 # moments in a period at which pulses are looked at, shares of a full one
@@ -70,11 +107,23 @@ def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedul
     rate of its own.
 
     Each pulse is one that lowers, as an impulse, the largest nutation of the motion that follows
-    most.
+    most. Channels that waste fire only where the others leave too much.
     """
+    channels = at_hand(spacecraft, usable(spacecraft))
+    thrifty = without_waste(spacecraft, channels)
+    builder = _fired_on_true_motion(spacecraft, options, thrifty)
+    if len(thrifty) < len(channels) and not _suffices(spacecraft, builder.at_leg.nutation):
+        other = _fired_on_true_motion(spacecraft, options, channels)
+        builder = min(builder, other, key=lambda each: each.at_leg.nutation)
+    return builder.schedule()
+
+
+def _fired_on_true_motion(
+    spacecraft: Spacecraft, options: FourPulseOptions, channels: list[Channel]
+) -> FlownBuilder:
+    """Pulses of the ``channels``, each the best one at its time."""
     from nutdamp.schemes.valve_commands import FlownBuilder
 
-    channels = at_hand(spacecraft, usable(spacecraft))
     builder = FlownBuilder(spacecraft)
     most = spacecraft.limits.max_pulses or MOST_FLOWN
     while len(builder.pulses) < most and builder.at_leg.nutation > LEFT and not work.exhausted():
@@ -86,7 +135,7 @@ def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedul
         if after.at_leg.nutation >= builder.at_leg.nutation:
             break
         builder = after
-    return builder.schedule()
+    return builder
 
 
 def _best_pulse(

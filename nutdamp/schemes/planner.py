@@ -14,6 +14,7 @@ from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
 from nutdamp.schemes.correction import Correction, SymmetricModel, left, model_of
+from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
@@ -93,7 +94,8 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
         return made
     on_true = import_module(scheme.module).on_true_motion(spacecraft, chosen)
     other = Correction(scheme, chosen)(spacecraft, on_true)
-    return other if left(spacecraft, other, momentum=False) < remains else made
+    less = left(spacecraft, other, momentum=False) < remains
+    return other if less and keeps_limits(spacecraft, other.pulses) else made
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:

@@ -62,6 +62,11 @@ class ImpulseBuilder:
         return self.A * abs(self.omega)
 
     @property
+    def nutation(self) -> float:
+        """Nutation angle of what is left, rad."""
+        return math.atan2(self.left, abs(self.C * self.spin + self.wheel))
+
+    @property
     def settled(self) -> bool:
         """True if the residual is rounding; under dissipation, if correction of the last pulse
         suffices.

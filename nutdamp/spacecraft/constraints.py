@@ -174,6 +174,36 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     ]
 
 
+WASTEFUL = 0.5
+"""Share of the nutation that the best channel takes away at the same cost, below which another one
+wastes.
+
+The nutation turns past every channel, so the best one can do all. Its longest useful pulse, half a
+nutation turn, still acts with 2/π = 0.64 of its impulse: a channel below that costs more, however
+long the pulses of the best. One half spares channels that are alike but for tolerances. R1 and R2
+of weak-doubled.yaml, which push past the centre of mass, have an eighteenth.
+"""
+
+
+def worths(spacecraft: Spacecraft, channels: Sequence[Channel]) -> list[float]:
+    """Small nutation that each channel takes away for propellant (impulse where that of one is
+    unknown), over that of the best.
+    """
+    known = all(channel.mass_flow is not None for channel in channels)
+    circle = spacecraft.inertia.circle(spacecraft.spin)
+    rates = [
+        float(np.linalg.norm(circle * channel.torque[:2])) / channel.cost_rate(by_propellant=known)
+        for channel in channels
+    ]
+    return [rate / max(rates) for rate in rates]
+
+
+def without_waste(spacecraft: Spacecraft, channels: Sequence[Channel]) -> list[Channel]:
+    """Channels but for those of a worth below `WASTEFUL`."""
+    shares = zip(channels, worths(spacecraft, channels), strict=True)
+    return [channel for channel, share in shares if share >= WASTEFUL]
+
+
 SOME_WIDTHS = 500  # of a range in finer steps so many, evenly spread: then neighbours of the best
 
 

@@ -326,6 +326,14 @@ class Schedule:
         """Propellant where the ``unit`` is kg and it is known, else impulse in N m s."""
         return self.cost if unit == "kg" else self.total_impulse
 
+    def spent(self, least: str, unit: str = "kg") -> float:
+        """Amount of what is saved: propellant or impulse, in ``unit``, the end, s, or pulses."""
+        if least == "time":
+            return self.end
+        if least == "pulses":
+            return float(len(self.pulses))
+        return self.total_impulse if least == "impulse" else self.cost_in(unit)
+
     @property
     def end(self) -> float:
         """End of the last pulse, s; 0 without pulses."""

@@ -23,7 +23,7 @@ from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
-from nutdamp.planning.notes import shift_notes
+from nutdamp.planning.notes import shift_notes, spacecraft_notes
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
@@ -37,7 +37,16 @@ from nutdamp.views.tables import (
     to_figures,
     values_of,
 )
-from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
+from nutdamp.views.text import (
+    degrees,
+    duration,
+    moment,
+    note_json,
+    ordered,
+    quantity,
+    small_angle,
+    vector,
+)
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
 
@@ -269,18 +278,19 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     return summary(
         [*head, derived_table(spacecraft, more)],
         partial(table.screen, "screen") if table.rows else None,
-        (*warnings(spacecraft), *_notes(spacecraft, verbose)),
+        (*warnings(spacecraft), *_notes(spacecraft, verbose=verbose)),
         "nutdamp plan · nutdamp report",
         more=[each.screen("screen") for each in tables if each.rows],
         verbose=verbose,
     )
 
 
-def _notes(spacecraft: Spacecraft, verbose: bool) -> Iterator[Note]:
+def _notes(spacecraft: Spacecraft, *, verbose: bool) -> Iterator[Note]:
     """Notes on a valid file; ``verbose``: disturbances stand in a table."""
     yield from shift_notes(spacecraft)
     clock = capability.sun_clock(spacecraft)
     dispersions = spacecraft.dispersions
+    yield from spacecraft_notes(spacecraft)
     if spacecraft.utc(0.0) is not None and spacecraft.utc(spacecraft.horizon) is None:
         yield note("dates-end", horizon_s=spacecraft.horizon)
     if clock is not None and clock.refusal:
@@ -334,7 +344,6 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s",
     )
     if not spacecraft.inertia.aligned:
-        yield "wobble", f"principal axis 3 is {degrees(spin.tilt)} off the third axis of the file"
         for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
             yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
 
@@ -473,6 +482,10 @@ def checked_json(
         "valid": True,
         "faults": [],
         "warnings": _faults_json(doubts),
+        "notes": [
+            note_json(entry)
+            for entry in ordered((*warnings(spacecraft), *_notes(spacecraft, verbose=True)))
+        ],
         "spacecraft": spacecraft_json(spacecraft),
         "channels": channels,
         **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),

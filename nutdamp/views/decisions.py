@@ -20,6 +20,7 @@ from nutdamp.planning.notes import (
     comparison_warnings,
     plan_notes,
     reasons,
+    spacecraft_notes,
     verdict_notes,
 )
 from nutdamp.planning.plan import Plan
@@ -53,7 +54,14 @@ def comparison_json(compared: Comparison) -> dict[str, Any]:
         "reason": joined(reasons(compared)),
         "notes": [
             note_json(note)
-            for note in ordered((*comparison_warnings(compared), *beside, *alternatives(compared)))
+            for note in ordered(
+                (
+                    *spacecraft_notes(compared.spacecraft),
+                    *comparison_warnings(compared),
+                    *beside,
+                    *alternatives(compared),
+                )
+            )
         ],
         "decision": decision_json(judged),
     }

@@ -22,6 +22,7 @@ from nutdamp.planning.notes import (
     comparison_warnings,
     plan_notes,
     reasons,
+    spacecraft_notes,
     verdict_notes,
 )
 from nutdamp.planning.plan import Plan
@@ -331,12 +332,13 @@ def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
     """
     chosen = compared.recommended
     infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
+    before = spacecraft_notes(compared.spacecraft)
     if chosen is None:
-        return ordered(infeasible)
+        return ordered([*before, *infeasible])
     own = plan_notes(chosen, cones=False)
     missed = () if robust else comparison_warnings(compared, tabulated=True)
     beside = verdict_notes(compared.verdict, chosen)
-    return ordered([*missed, *beside, *alternatives(compared), *infeasible, *own])
+    return ordered([*missed, *before, *beside, *alternatives(compared), *infeasible, *own])
 
 
 def headline(compared: Comparison) -> Text:
@@ -392,10 +394,11 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         schemes,
     ]
     lead: list[RenderableType] = [parts.named(compared.spacecraft), headline(compared)]
+    general = map(screen_line, ordered(spacecraft_notes(compared.spacecraft)))
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]
     results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
     if chosen is None:
-        return Group(*lead, *results)
+        return Group(*lead, *general, *results)
     pulses = chosen.pulses
     if pulses.blocks:
         results += [Text(), parts.blocks_screen(chosen.flight, chosen.delta_v)]
@@ -424,6 +427,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
             )
             for cheaper in judged.cheaper
         ),
+        *general,
         *map(screen_line, ordered(beside)),
         *(Text(), verdicts.bound_table(judged).screen("screen")),
         *(Text(), end_facts(chosen)),

@@ -4,12 +4,13 @@ DOP853.
 
 import cmath
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support import reference
-from support.builders import channel, present, spinner
+from support.builders import channel, cross, present, spinner
 from support.cases import deep, spread
 from support.golden import refused
 from support.loops import fired_by, fires, four, transverse_size, turned
@@ -20,7 +21,7 @@ from nutdamp.control_loop.sensor import HARMONIC, Estimator, Signal, felt, gain,
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
-from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.model import Limits, Spacecraft, Vector
 
 FOUR = four(least=0.01, most=1.0)
 TABLE = {"+M1": (1, 1), "-M1": (1, -1), "+M2": (0, -1), "-M2": (0, 1)}
@@ -43,6 +44,27 @@ def after(
     times = end + np.linspace(0.0, 7.5, 376)
     path = reference.path(moments, begun, [reference.Push(start, end, torque)], times)
     return np.array([each.rates for each in path])
+
+
+@pytest.mark.parametrize(("share", "dissipation", "horizon", "firing"), [
+    (0.51, None, None, 4),
+    (0.49, None, None, 2),
+    (0.49, 40.0, None, 4),  # two alone do not outdo the growth
+    (0.49, 400.0, None, 2),
+    (0.49, None, 54.0, 4),  # nor end in time
+    (0.49, None, 56.0, 2),
+])  # fmt: skip
+def test_channels_that_waste_stay_off_unless_growth_or_horizon_needs_them(
+    share: float, dissipation: float | None, horizon: float | None, firing: int
+) -> None:
+    """|ω|, 0.175 rad/s at 5 deg, falls by 2Mτ/A in a period of 6.28 s: to nothing in 55 s."""
+    strong = cross(4.0, max_on_time=0.3)[:2]
+    weak = cross(share * 4.0, "R", max_on_time=0.3)[2:]
+    spends = tuple(replace(each, spends=4.0) for each in weak)  # as much as strong ones do
+    body = fired_by(
+        5.0, (*strong, *spends), dissipation=dissipation, limits=Limits(horizon=horizon)
+    )
+    assert len(Law(body, fires()).actuators) == firing
 
 
 @pytest.mark.parametrize(("C", "spin"), [(80.0, 3.0), (80.0, -3.0), (160.0, 3.0), (160.0, -3.0)])

@@ -41,8 +41,9 @@ from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.catalogue import CLASSIC, FourPulseOptions, Options
 from nutdamp.schemes.correction import model_of, steady_omega
 from nutdamp.schemes.sequential import ImpulseBuilder
+from nutdamp.spacecraft.constraints import worths
 from nutdamp.spacecraft.equipment import Channel, Steerable
-from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.views.check import checked_json
 
@@ -526,6 +527,69 @@ def test_on_times_of_four_pulse() -> None:
     )
     assert why_not(("four-pulse", body, too_long))
     assert len(feasible_by("four-pulse", body, useful).pulses) == 1
+
+
+STRONG = cross(4.0, max_on_time=0.3, isp=220.0, thrust=1.0)[:2]
+LONG = math.tan(math.radians(5.0)) * 80.0 * 3.0 / 4.0  # s of firing that STRONG needs: A|ω0|/M
+
+
+def wasting(share: float) -> tuple[Channel, ...]:
+    """Two strong channels, and two beside them with a ``share`` of the arm."""
+    return (*STRONG, *cross(share * 4.0, "R", max_on_time=0.3, isp=220.0, thrust=1.0)[2:])
+
+
+@pytest.mark.parametrize(("share", "limits", "options", "firing"), [
+    (0.51, Limits(), Options(), 4),
+    (0.49, Limits(), Options(), 2),
+    (0.05, Limits(), Options(coarse=True), 2),
+    (0.05, Limits(), Options(least="impulse"), 2),
+    (0.49, Limits(), Options(least="time"), 4),  # they help to end earlier
+    (0.49, Limits(horizon=52.0), Options(), 4),  # too short for two
+])  # fmt: skip
+def test_a_channel_that_wastes_fires_where_the_others_are_not_enough(
+    share: float, limits: Limits, options: Options, firing: int
+) -> None:
+    """Against the plan of the strong channels alone, which takes A|ω0| over their torque."""
+    most = math.radians(0.3)
+    body = spinner(channels=wasting(share), limits=limits, requirement=Requirement(most))
+    plan = feasible_by("four-pulse", body, options)
+    assert len({pulse.channel for pulse in plan.pulses}) == firing
+    assert plan.flight.residual.nutation <= most
+    alone = planning.plan(replace(body, channels=STRONG), "four-pulse", options).pulses
+    if firing == 2:
+        assert [pulse.t for pulse in plan.pulses] == [pulse.t for pulse in alone]
+        assert sum(pulse.on_time for pulse in alone) == pytest.approx(LONG, rel=0.03)
+    else:
+        assert plan.pulses.end < alone.end
+
+
+def test_weak_channels_of_three_moments_keep_the_ticks() -> None:
+    """A schedule laid on the true motion leaves less, but starts on no tick."""
+    for degrees in (2.0, 12.0):
+        body = spinner(moments=(100.0, 140.0, 80.0), degrees=degrees, channels=STRONG)
+        limits = Limits(horizon=60.0 if degrees == 2.0 else 30.0, tick=0.01)
+        weak = tuple(each.of(torque=0.25 * each.torque) for each in STRONG)
+        feasible_by("four-pulse", replace(body, channels=weak, limits=limits))
+
+
+def test_the_worth_of_a_channel_is_the_nutation_that_it_makes_at_its_cost() -> None:
+    """By arm, isp and moment of its axis: largest nutation of DOP853 after a kick of a pure spin;
+    an impulse takes as much away.
+    """
+    body = spinner(moments=(90.0, 150.0, 60.0), degrees=0.0)
+    channels = [
+        channel("1", 4.0, 0.0, 0.0, isp=200.0, thrust=1.0),
+        channel("2", 0.0, -2.0, 0.0, isp=300.0, thrust=0.5),
+    ]
+    made = []
+    for each in channels:
+        kick = 1e-4 * each.torque / present(each.mass_flow) / np.array(body.inertia.moments)
+        start = reference.Motion(body.omega0 + kick, np.eye(3))
+        times = np.linspace(0.0, body.body_period, 400)[1:]
+        path = reference.coast(body.inertia.moments, start, np.zeros(3), times)
+        angles = [reference.nutation(body.inertia.moments, each.rates, 1.0) for each in path]
+        made.append(max(angles))
+    assert worths(body, channels) == pytest.approx([each / max(made) for each in made], rel=1e-3)
 
 
 def test_with_a_wheel_at_no_spin_a_pair_closes_that_stands_still_in_space() -> None:

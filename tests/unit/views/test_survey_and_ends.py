@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
-from support.builders import Outcome, aimed, present, spinner
+from support.builders import Outcome, aimed, channel, present, spinner
 from support.cases import deep
 from support.golden import check_text
 from support.places import CASES, case
@@ -29,6 +29,7 @@ from nutdamp.flight import propagation
 from nutdamp.physics import attitude, driven
 from nutdamp.planning import capability
 from nutdamp.planning import plan as planning
+from nutdamp.planning.notes import spacecraft_notes
 from nutdamp.schemes import block_model, one_pulse
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.spacecraft.equipment import Steerable
@@ -55,6 +56,54 @@ commands: {delay_step: 2 ms, delay_max: 1.9 s, width: {step: 1 ms, min: 20 ms, m
 keep: [{name: pole, direction: [10 deg, 86 deg], min: 2 deg}]
 """
 SUN_BODY = read_spacecraft(SUNNY, "sunny.yaml")
+
+
+def test_a_principal_axis_off_the_file_by_more_than_the_nutation_allowed_is_a_warning() -> None:
+    """The tilt by the eigenvectors of the tensor; without a requirement damped is the limit."""
+    tensor = [[752, 81.1, -25.7], [81.1, 1305, 74.1], [-25.7, 74.1, 1490]]
+    state = "{spin: 5 rpm, nutation: 2 deg}"
+    tilted = (
+        f"name: x\ninertia: {{tensor: {tensor}}}\nstate: {state}\nrequirement: {{nutation: 1 deg}}"
+    )
+    body = read_spacecraft(tilted, "tilted.yaml")
+    _, axes = np.linalg.eigh(tensor)
+    tilt = math.acos(abs(axes[2, 2]))
+    assert body.requirement is not None
+    for share in (0.999, 1.001):
+        at_edge = replace(body, requirement=replace(body.requirement, nutation=share * tilt))
+        assert [entry.code for entry in spacecraft_notes(at_edge)] == (
+            ["principal-axis-off"] if share < 1.0 else []
+        )
+    (warning,) = spacecraft_notes(replace(body, requirement=None))
+    assert warning.values == pytest.approx(
+        {"tilt_deg": math.degrees(tilt), "limit_deg": 0.01 * math.degrees(body.nutation)}, rel=1e-9
+    )
+    assert not [*spacecraft_notes(EXAMPLE)]
+
+
+@pytest.mark.parametrize(("angles", "isps", "codes"), [
+    ((0, 22), (220, 220), ["channels-push-alike"]),
+    ((0, 23), (220, 220), []),
+    ((350, 0, 10), (220, 220, 220), ["channels-push-alike"]),
+    ((0, 0, 90), (220, 220, 220), []),
+    ((30,), (220,), []),
+    ((0, 180), (220, 111), []),
+    ((0, 180), (220, 109), ["channels-waste"]),
+])  # fmt: skip
+def test_actuators_that_do_not_fit_are_notes(
+    angles: tuple[float, ...], isps: tuple[float, ...], codes: list[str]
+) -> None:
+    """Half of a pulse of T_ω/8 is 22.5° of nutation; one channel alone is meant so."""
+    body = spinner(
+        channels=tuple(
+            channel(f"T{at}", math.cos(at), math.sin(at), 0.0, isp=isp, thrust=1.0)
+            for at, isp in zip(map(math.radians, angles), isps, strict=True)
+        )
+    )
+    assert [entry.code for entry in spacecraft_notes(body)] == codes
+    for entry in spacecraft_notes(body):
+        if entry.code == "channels-waste":
+            assert entry.values["worth_percent"] == pytest.approx(100.0 * 109 / 220, rel=1e-12)
 
 
 def fired(body: Spacecraft, on_time: float) -> propagation.Residual:
