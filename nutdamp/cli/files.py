@@ -45,7 +45,7 @@ from nutdamp.cli.options import (
 from nutdamp.cli.plan import compared_with, robust_of, scheme_option
 from nutdamp.cli.studies import flown_options, fronts_of, plan_or_read
 from nutdamp.common.work import SAMPLES
-from nutdamp.errors import BadRequest, cure_of, printable
+from nutdamp.errors import cure_of, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
 from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
 
@@ -308,8 +308,8 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
     help="Spacecraft file to write; default standard output.",
 )
 @click.option("--into", type=FILE, help="Spacecraft file into which the message is merged.")
-@click.option("--inertia", is_flag=True, help="Merge the moments of inertia too.")
-@click.option("--at", type=END, help="Record of an AEM, after its first; default the first.")
+@click.option("--inertia", is_flag=True, help="Merge moments of inertia and mass too.")
+@click.option("--at", type=END, help="Record of a history, after its first; default the first.")
 @click.option(
     "--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`."
 )
@@ -317,67 +317,48 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 def import_command(
     job: Job, given: tuple[str, ...], into: str | None, inertia: bool, at: float | None
 ) -> None:
-    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN), or
-    merge one into a file.
+    """Make a spacecraft file from an attitude message, or merge one into a file.
 
-    With --into the attitude, epoch and rates of an APM, or of a record of an attitude history
-    (AEM), replace those of a spacecraft file; all else stays. Without it the message needs an
-    inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
-    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque.
-    FILE may be - for standard input.
+    Read are CCSDS messages of version 2 in KVN (APM, AEM, ACM) and attitude files of STK (.a). With
+    --into attitude, epoch and rates, of a history those of one record, replace those of a
+    spacecraft file; all else stays. Without it the message needs inertia and the motion: angular
+    velocity or spin. It knows no thrusters; where all its manoeuvres are transverse and of one
+    torque, the file gets a steerable torquer of that torque. FILE may be - for standard input.
     """
     *form, file = given
     if form not in ([], ["apm"]):
-        raise click.UsageError(
-            f"expected one FILE, an attitude parameter message; got {' '.join(given)}"
-        )
+        raise click.UsageError(f"expected one FILE, an attitude message; got {' '.join(given)}")
     output, schedule = job.written["output"], job.written["schedule"]
     expect_outputs(file, into, output=output, schedule=schedule)
     if into is None and (inertia or at is not None):
         raise click.UsageError(
             "--inertia and --at say what to merge: name the spacecraft file with --into"
         )
+    if into is not None and schedule is not None:
+        raise click.UsageError(
+            "--schedule writes the manoeuvres of a message that makes a spacecraft file"
+        )
 
-    from nutdamp.files.ccsds.read import (
-        ApmContents,
-        contradictions,
-        imported,
-        is_history,
-        merged_text,
-        ratio_doubts,
-        read_apm,
-        read_history,
-    )
-    from nutdamp.files.reader import read_spacecraft
+    from nutdamp.files.ccsds.read import read_message
+    from nutdamp.files.ccsds.write import contradictions, imported, merge
     from nutdamp.flight.propagation import flown
+    from nutdamp.spacecraft.schedule import Schedule
     from nutdamp.views.parts import pulse_table
 
+    contents = read_message(file)
     if into is not None:
-        if schedule is not None:
-            raise click.UsageError(
-                "--schedule writes the manoeuvres of a message that makes a spacecraft file"
-            )
-        message = read_history(file) if is_history(file) else read_apm(file)
-        for entry in message.remarks:
-            job.remark(f"{file}: {entry}")
-        merged = merged_text(
-            FileInput(into).source(job.remark, job.doubt), message, at or 0.0, inertia=inertia
-        )
-        deliver([(output, lambda: merged)])
-        if isinstance(message, ApmContents):
-            for entry in ratio_doubts(message, read_spacecraft(merged, into)):
-                say(f"{file}: warning: {entry}")
-        return
-    if is_history(file):
-        raise BadRequest(
-            f"{file}: an attitude history has no inertia; --into merges it into a spacecraft file"
-        )
-    contents = read_apm(file)
-    text, body, pulses = imported(contents, file)
-    deliver([(output, lambda: text), (schedule, lambda: pulse_table(flown(body, pulses)).csv())])
-    for entry in contents.remarks:
+        source = FileInput(into).source(job.remark, job.doubt)
+        text, remarks, doubts = merge(source, contents, at or 0.0, inertia=inertia)
+        deliver([(output, lambda: text)])
+        pulses = Schedule()
+    else:
+        text, body, pulses = imported(contents, file)
+        sheet = (schedule, lambda: pulse_table(flown(body, pulses)).csv())
+        deliver([(output, lambda: text), sheet])
+        remarks, doubts = contents.remarks, contradictions(contents, body, "the latter nutation")
+    for entry in remarks:
         job.remark(f"{file}: {entry}")
-    for entry in contradictions(contents, body):
+    for entry in doubts:
         say(f"{file}: warning: {entry}")
     if pulses.pulses and schedule is None:
         job.remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")

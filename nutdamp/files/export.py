@@ -98,12 +98,15 @@ def _vector(vector: Iterable[float] | Vector) -> str:
     return "[" + ", ".join(repr(float(part) + 0.0) for part in vector) + "]"
 
 
-FRAMES = ("EME2000", "J2000", "GCRF")  # inertial frames of the formats
-AXES = {
-    "EME2000": "J2000",
-    "J2000": "J2000",
-    "GCRF": "ICRF",
-}  # their names in the format of the Systems Tool Kit
+AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
+"""Inertial frames that the formats have a name for, and their names in that of the Systems Tool
+Kit.
+"""
+FRAMES = tuple(AXES)
+FRAME_NAMES = {**{frame: frame for frame in FRAMES}, "ICRF": "GCRF"}
+"""Frames of a spacecraft file by their names in messages."""
+
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 
 EXAMPLE = {
     "epoch": "2026-03-01T12:00:00Z           # of t = 0, UTC",
@@ -222,13 +225,12 @@ def stk_attitude(flown: Flight, until: float, reference: Reference, about: str =
             last = t, rate
     date, _, clock = reference.epoch.text.partition("T")
     day = datetime.date.fromisoformat(date)
-    months = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
     lines = [
         "stk.v.11.0",
         f"# nutdamp {__version__}: {' '.join(f'{flown.spacecraft.name} {about}'.split())}",
         "BEGIN Attitude",
         f"NumberOfAttitudePoints {len(rows)}",
-        f"ScenarioEpoch {day.day} {months[day.month - 1]} {day.year} {clock}",
+        f"ScenarioEpoch {day.day} {MONTHS[day.month - 1]} {day.year} {clock}",
         "CentralBody Earth",
         f"CoordinateAxes {AXES[reference.frame]}",
         "InterpolationOrder 1",

@@ -1,4 +1,4 @@
-"""Telemetry from CSV files and attitude ephemeris messages: times, and measurements of the motion.
+"""Telemetry from CSV files and attitude messages: times, and measurements of the motion.
 
 An empty cell of CSV is a missing sample; a track of ``simulate --csv`` is such a file.
 """
@@ -29,7 +29,7 @@ from nutdamp.estimation.parameters import (
     of_quaternions,
 )
 from nutdamp.estimation.search import BROKEN, absurd
-from nutdamp.files.ccsds.read import History, is_history, read_history
+from nutdamp.files.ccsds.read import Contents, is_message, read_message
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
@@ -37,18 +37,22 @@ from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import KINDS
 
 
-def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:
+def record_of(history: Contents, spacecraft: Spacecraft, schedule: Schedule) -> Record:
     """Telemetry of a history, from attitude.epoch of the file on; raises BadRequest where it has
     none.
+
+    Rates count where the message has all three: of a spin alone the attitudes tell more.
     """
     start = spacecraft.attitude
+    if len(history.times) < 2 or history.frame is None:
+        raise BadRequest("the message has no attitudes at several times: expected a history")
     if start is None or start.epoch is None:
         raise BadRequest(
             "the spacecraft file has no attitude.epoch to count the times of a history from"
         )
     seen = Attitude(history.quaternions, start.epoch, history.frame).seen_in(start.frame)
     signals = of_quaternions(seen.quaternion, spacecraft)
-    if history.rates is not None:
+    if np.isfinite(history.rates).all(axis=1).any():
         signals |= dict(zip(GYROS, history.rates.T, strict=True))
     times = history.times + history.epoch.since(Epoch.parse(start.epoch))
     return Record(times, signals, np.empty(0), 0.0, schedule)
@@ -114,8 +118,8 @@ def read_telemetry(
     """The record in a file, with ``sun_pulses`` of another, and warnings; raises CannotRead and
     FaultyFile.
     """
-    if is_history(str(path)):
-        history = read_history(str(path))
+    if is_message(str(path)):
+        history = read_message(str(path))
         record = record_of(history, spacecraft, schedule or Schedule())
         warnings = [f"{path}: {remark}" for remark in history.remarks]
     else:

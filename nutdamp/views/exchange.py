@@ -129,7 +129,7 @@ def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
         written = write.aem(plan, flown(spacecraft, plan.pulses, until), until, place, now, form)
     else:
         written = (write.opm if row.needs_orbit else write.apm)(plan, place, now)
-    return message.to_xml(written) if xml else message.to_kvn(written)
+    return write.to_xml(written) if xml else write.to_kvn(written)
 
 
 def export_notes(plan: Plan, form: str) -> list[Note]:

@@ -1,57 +1,51 @@
-"""Attitude messages read in KVN, turned into a spacecraft file and a schedule, or merged into a
-spacecraft file.
+"""Attitude messages read: APM, AEM and ACM in KVN, and attitude files of the Systems Tool Kit.
 
-In a parameter message (APM) attitude and rates come from QUAT (or EULER) and ANGVEL, or else from
-SPIN by annex F5. A history (AEM) gives quaternions, and rates where it has them; the other forms of
-an ephemeris leave the rates open or hold for symmetric bodies alone. A merge sets attitude, epoch
-and rates, and the inertia where that is asked for; all else of the file stays, with its comments
-and units.
+Lines become tokens, tokens blocks, and blocks fields by the tables of `message`; every fault has
+its line and field, and nothing is guessed. Attitude and rates follow from the fields by annex F of
+CCSDS 504.0-B-2. A parameter message is a history of one record.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from nutdamp.common.time import DIGITS, Epoch
-from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
+from nutdamp.common.time import Epoch
+from nutdamp.errors import BadRequest, Fault, FaultyFile, listed, nearest
 from nutdamp.files.ccsds import message
-from nutdamp.files.ccsds.message import (
-    QUATERNION_ANGVEL,
-    Checked,
-    Keyword,
-    MessageBlock,
-    MessageReader,
-)
-from nutdamp.files.editing import (
-    Edits,
-    Later,
-    attitude_edits,
-    carry_text,
-    epoch_after,
-    inertia_edits,
-    rate_edits,
-)
+from nutdamp.files.ccsds.message import FORMS, VERSION, Form, Keyword, Layout, names
+from nutdamp.files.export import AXES, FRAME_NAMES, FRAMES, MONTHS
 from nutdamp.files.fields import LONGEST_NAME
-from nutdamp.files.reader import Source, read_spacecraft
-from nutdamp.files.yaml import Node, read_bytes
+from nutdamp.files.yaml import decode, read_bytes, read_limited
 from nutdamp.physics import attitude
-from nutdamp.physics.body import principal_axes
-from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
-from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
+from nutdamp.spacecraft.model import Vector
 
-AGREES = (
-    1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
-)
+MOST_BYTES = 16 << 20  # size of a message, many times more than its most manoeuvres take
+LARGEST = 1e15  # larger magnitudes are nothing physical
+UNIT = 1e-4  # deviation from length one up to which a quaternion counts as rounded
+AGREES = 1e-4  # up to which SPIN agrees with other blocks of an APM: rad, and relative for rates
+SAME = 1.0 - AGREES**2 / 8.0  # product of the quaternions of attitudes that agree
 
-_VERSION = "CCSDS_APM_VERS"
-_OUTSIDE = (Keyword(_VERSION), *message.HEADER, *message.APM_METADATA, Keyword("EPOCH"))
-_NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
+BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
+"""Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
+
+BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
+_STK = re.compile(r"stk\.v\.[0-9.]+", re.IGNORECASE)
+
+_PAIR = re.compile(r"([A-Z0-9_]+)\s*=\s*(.*?)(?:\s+\[([^\]]*)\])?")
+_EDGE = re.compile(r"([A-Z0-9_]+)_(START|STOP)")
+_LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_DATE = re.compile(rf"([0-9]{{1,2}}) ({'|'.join(MONTHS)}) ([0-9]{{4}}) (\S+)")
+
+RADIANS_BETWEEN = 2.0
+"""rad; records that the body turns by more from one to the other tell no rates: beyond half a turn
+it is not even known which way.
+"""
 
 
 class Manoeuvre(NamedTuple):
@@ -65,570 +59,596 @@ class Manoeuvre(NamedTuple):
     mass: float | None
 
 
-class ApmContents(NamedTuple):
-    """Contents of a message, in body axes: ``quaternion`` body -> frame, scalar first; ``rates``
-    rad/s.
+class Contents(NamedTuple):
+    """Contents of a message, in body axes: records at ``times`` (n,) s after ``epoch``.
 
-    ``tensor`` kg m²; ``nutation`` rad as SPIN states it, where its rates count; ``lines`` where
-    blocks begin; ``remarks`` for the reader.
+    ``quaternions`` (n, 4) body -> frame, scalar first, ``rates`` (n, 3) rad/s and ``nutations``
+    (n,) rad, NaN where the message has none; ``stretches`` (n,) numbers of motions without jumps.
+    ``tensor`` kg m²; ``mass`` kg; ``lines`` where blocks begin; ``remarks`` for the user.
     """
 
     name: str
     object_id: str | None
     epoch: Epoch
     frame: str | None
-    quaternion: Vector | None
+    times: Vector
+    quaternions: Vector
     rates: Vector
+    nutations: Vector
+    stretches: Vector
     tensor: Vector | None
-    nutation: float | None
+    mass: float | None
     manoeuvres: tuple[Manoeuvre, ...]
     lines: dict[str, int]
     remarks: tuple[str, ...]
 
+    def at(self, time: float = 0.0, spin: float = 0.0) -> Contents:
+        """The first record from ``time`` s on, of a body that spins at about ``spin`` rad/s.
 
-def read_apm(path: str) -> ApmContents:
-    """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    return _ApmReader(path).read()
+        Rates that it has not are those of the polynomial through the turns to up to two records on
+        either side, or of the spin alone. Raises BadRequest where there is no record.
+        """
+        index = int(np.searchsorted(self.times, time))
+        if index == len(self.times):
+            last = f"{self.times[-1]:.6g} s after its first record" if index else "without records"
+            raise BadRequest(f"the history ends {last}: expected a time in it")
+        record = [index]
+        rates, remarks = self.rates[index], self.remarks
+        unknown = np.isnan(rates)
+        speed = abs(spin if unknown[2] else rates[2])
+        near = np.arange(max(index - 2, 0), min(index + 3, len(self.times)))
+        span = self.times[near] - self.times[index]
+        usable = np.abs(span) * speed < RADIANS_BETWEEN
+        usable &= self.stretches[near] == self.stretches[index]
+        near, span = near[usable], span[usable]
+        if unknown.any() and len(near) > 1:
+            turns = attitude.multiply(
+                attitude.conjugate(self.quaternions[index]), self.quaternions[near]
+            )
+            turns = turns * np.where(turns[:, :1] < 0.0, -1.0, 1.0)
+            sines = np.linalg.norm(turns[:, 1:], axis=1)
+            angles = 2.0 * np.arctan2(sines, turns[:, 0])
+            vectors = turns[:, 1:] * (angles / np.where(sines > 0.0, sines, 1.0))[:, None]
+            # Weights that differentiate every polynomial through these moments.
+            scale = np.abs(span).max()
+            powers = np.vander(span / scale, increasing=True)
+            weights = np.linalg.solve(powers.T, np.eye(len(near))[1]) / scale
+            rates = np.where(unknown, weights @ vectors, rates)
+            remarks += ("rates that the message does not have follow from its attitudes nearby",)
+        elif not unknown[2]:
+            rates = np.nan_to_num(rates)
+        return self._replace(
+            epoch=self.epoch.plus(float(self.times[index])),
+            times=np.zeros(1),
+            quaternions=self.quaternions[record],
+            rates=rates[None],
+            nutations=self.nutations[record],
+            stretches=self.stretches[record],
+            remarks=remarks,
+        )
 
 
-class _ApmReader(MessageReader):
+Entry = tuple[int, str, str, str | None]
+"""Line, keyword, value and unit."""
+
+
+class BlockLines(NamedTuple):
+    """Entries and data lines of a block, which begins in ``line``; without name those outside."""
+
+    name: str
+    line: int
+    entries: list[Entry]
+    rows: list[tuple[int, list[str]]]
+
+
+class MessageReader:
+    """Reader of one message: its tokens, and what its blocks share.
+
+    Raises CannotRead, or FaultyFile for XML.
+    """
+
     def __init__(self, path: str) -> None:
-        super().__init__(path, _VERSION)
-        self.about = Checked(self, self.outside, _OUTSIDE)
-        self.by_name: dict[str, list[Checked]] = {name: [] for name in message.APM_BLOCKS}
-        self.nutation: float | None = None
-        order = list(message.APM_BLOCKS)
-        last = ""
-        for block in self.blocks:
-            name, line = block.name, block.line
-            if name not in message.APM_BLOCKS:
-                known = ", ".join(f"{each}_START" for each in order)
-                self.fault(line, f"{name}_START", f"unknown block; known are {known}")
+        self.path, self.remarks = path, list[str]()
+        self.faults: dict[tuple[int, str], Fault] = {}
+        self.system = "UTC"
+        self.frames: dict[bool, str] = {}  # True: fixed in the body
+        self.epochs: list[Epoch] = []
+        self.motions: list[Motion] = []
+        self.lines: dict[str, int] = {}
+        data = read_limited(path, MOST_BYTES)
+        if data.lstrip(BEFORE).startswith(b"<"):
+            self.fault(1, "", "XML is not read; convert to KVN (keyword = value notation)")
+            raise FaultyFile([*self.faults.values()])
+        self.tokens = [
+            (line, raw.strip())
+            for line, raw in enumerate(_LINE_END.split(decode(data, path)), start=1)
+            if raw.strip() and raw.split(maxsplit=1)[0] != "COMMENT"
+        ]
+
+    def fault(self, line: int, where: str, problem: str) -> None:
+        """Keep a fault of the message, the first of each field."""
+        self.faults.setdefault((line, where), Fault(self.path, line, 1, where, problem))
+
+    def value(self, keyword: Keyword, text: str) -> Any:
+        """The value in a text by the kind of its keyword; raises ValueError, which says what is
+        wrong.
+        """
+        if not text:
+            raise ValueError("empty; expected a value")
+        if keyword.words and text not in keyword.words:
+            raise ValueError(f"{text!r} is not read; expected {listed(keyword.words, 'or')}")
+        match keyword.kind:
+            case "epoch":
+                return Epoch.parse(text, self.system)
+            case "date":
+                parts = _DATE.fullmatch(text)
+                if parts is None:
+                    raise ValueError(f"{text!r}: expected a date such as 1 Mar 2026 12:00:00.000")
+                day, month, year, clock = parts.groups()
+                return Epoch.parse(f"{year}-{1 + MONTHS.index(month):02d}-{day:0>2}T{clock}")
+            case "system":
+                self.system = text
+                if text != "UTC":
+                    self.remarks.append(f"times are {text}; the spacecraft file has them in UTC")
+                return text
+            case "frame" | "body":
+                return self._frame(text, keyword.kind == "body")
+            case "sequence":
+                if not re.fullmatch("[XYZ]{3}", text) or text[1] in (text[0], text[2]):
+                    raise ValueError(f"{text!r} is no sequence of three turns, such as ZXZ")
+                return text
+        if keyword.unit is None:
+            return text
+        numbers = text.split() if keyword.kind == "vector" else [text]
+        for number in numbers:
+            if not _NUMBER.fullmatch(number):
+                raise ValueError(f"{number[:40]!r} is not a number")
+            if not abs(float(number)) <= LARGEST:
+                raise ValueError(f"{number[:40]} is beyond anything physical")
+        first = float(numbers[0])
+        if (keyword.kind == "above" and first <= 0.0) or (keyword.kind == "most" and first > 0.0):
+            expected = "more than 0" if keyword.kind == "above" else "0 or less"
+            raise ValueError(f"{first:g} {keyword.unit}: expected {expected}")
+        return first
+
+    def _frame(self, name: str, fixed: bool) -> bool:
+        """True for a frame fixed in the body; one body and one inertial frame is all there is."""
+        in_body = BODY.fullmatch(name) is not None
+        frame = name if in_body else FRAME_NAMES.get(name)
+        if fixed and not in_body:
+            raise ValueError(f"{name!r} is no frame fixed in the body; expected SC_BODY_1")
+        if frame is None:
+            expected = f"SC_BODY_1 or one of {', '.join(FRAMES)}"
+            raise ValueError(f"{name!r} is no frame known here; expected {expected}")
+        shared = self.frames.setdefault(in_body, frame)
+        if AXES.get(shared, shared) != AXES.get(frame, frame):
+            raise ValueError(f"{name!r} here, {shared!r} in another block; expected one frame")
+        if frame != name:
+            self.remarks.append(f"{name} is taken as {frame}, whose axes are the same")
+        return in_body
+
+
+class Fields:
+    """Values of a block by keyword, checked against its table: problems are faults of the message,
+    and an unreadable value is then absent.
+
+    ``forward``: the block leads from the inertial frame to the body, not back.
+    """
+
+    def __init__(
+        self, reader: MessageReader, section: BlockLines, keywords: tuple[Keyword, ...]
+    ) -> None:
+        self.reader, self.section = reader, section
+        self.values: dict[str, Any] = {}
+        entries: dict[str, Entry] = {}
+        table = names(keywords)
+        for entry in section.entries:
+            line, name, *_ = entry
+            if name not in table:
+                close = nearest(name, table)
+                cure = f"did you mean {close}?" if close else f"known here: {', '.join(table)}"
+                reader.fault(line, name, f"unknown keyword; {cure}")
+            elif name in entries:
+                reader.fault(line, name, f"given again, first in line {entries[name][0]}")
+            else:
+                entries[name] = entry
+        self.lines = {name: line for name, (line, *_) in entries.items()}
+        inside = f" in this {section.name} block" if section.name else ""
+        for keyword in keywords:
+            if keyword.name not in entries:
+                if keyword.required:
+                    self.fault(keyword.name, f"missing{inside}")
                 continue
-            if last and order.index(name) < order.index(last):
-                self.fault(line, name, f"comes after {last}; the order is {', '.join(order)}")
-            elif self.by_name[name] and name != "MAN":
-                self.fault(line, name, "a second block of this kind; which one counts is not said")
-            last = name
-            self.by_name[name].append(Checked(self, block, message.APM_BLOCKS[name].keywords))
-
-    def _first(self, name: str) -> Checked | None:
-        return next(iter(self.by_name[name]), None)
-
-    def read(self) -> ApmContents:
-        outside = self.about
-        self.take_system(outside)
-        epoch = outside.epoch("EPOCH", self.system)
-        quaternion = self._attitude()
-        quaternion, rates = self._spin(quaternion, self._rates(quaternion))
-        tensor = self._inertia()
-        manoeuvres = self._manoeuvres(epoch)
-        if rates is None and not self.faults:
-            self.fault(
-                1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known"
-            )
-        if self.faults or epoch is None or rates is None:
-            raise FaultyFile(self.faults)
-        if quaternion is None:
-            self.remarks.append("the message gives no attitude: frame and epoch are left out")
-        object_id = outside.text("OBJECT_ID")
-        return ApmContents(
-            name=(outside.text("OBJECT_NAME") or "UNKNOWN")[:LONGEST_NAME],
-            object_id=None if object_id in (None, "UNKNOWN") else object_id[:LONGEST_NAME],
-            epoch=epoch,
-            frame=self.frame,
-            quaternion=quaternion,
-            rates=rates,
-            tensor=tensor,
-            nutation=self.nutation,
-            manoeuvres=manoeuvres,
-            lines={name: blocks[0].block.line for name, blocks in self.by_name.items() if blocks},
-            remarks=tuple(self.remarks),
-        )
-
-    def _attitude(self) -> Vector | None:
-        """Quaternion body -> frame of QUAT, or of EULER."""
-        turn: Vector | None = None
-        forward: bool | None = None
-        block = self._first("QUAT")
-        if block is not None:
-            forward = self.endpoints(block)
-            parts = block.numbers("QC", "Q1", "Q2", "Q3")
+            _, name, text, unit = entries[keyword.name]
+            if unit and unit != keyword.unit:
+                expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
+                self.fault(name, f"expected {expected}, got [{unit}]")
             try:
-                turn = None if parts is None else message.unit_quaternion(parts)
+                self.values[name] = reader.value(keyword, text)
             except ValueError as wrong:
-                block.fault("Q1", str(wrong))
-        elif (block := self._first("EULER")) is not None:
-            forward = self.endpoints(block)
-            parts = block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
-            sequence = block.text("EULER_ROT_SEQ") or ""
-            if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
-                block.fault(
-                    "EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ"
-                )
-            elif parts is not None:
-                turn = euler(sequence, *map(math.radians, parts))
-        if turn is None or forward is None:
-            return None
-        return turn if forward else attitude.conjugate(turn)
+                self.fault(name, str(wrong))
+        self.forward: bool = self.values.get("REF_FRAME_B", True)
+        if self.forward is self.values.get("REF_FRAME_A"):
+            self.fault("REF_FRAME_B", "one of the two frames must be the body, SC_BODY_1")
 
-    def _rates(self, quaternion: Vector | None) -> Vector | None:
-        """Rates of the body against the frame, in body axes, rad/s."""
-        block = self._first("ANGVEL")
-        if block is None:
-            return None
-        forward = self.endpoints(block)
-        parts = block.numbers(*message.ANGVEL)
-        axes = block.text("ANGVEL_FRAME")
-        if parts is None or axes is None or forward is None:
-            return None
+    def fault(self, keyword: str, problem: str) -> None:
+        """Something wrong with a keyword, or, where it is missing, with the block."""
+        self.reader.fault(self.lines.get(keyword, self.section.line), keyword, problem)
+
+    def columns(self, keywords: tuple[Keyword, ...]) -> dict[str, Vector]:
+        """Numbers of keywords that go together, (1,) each as one data line has them; empty where
+        one is absent.
+        """
+        absent = [name for name in names(keywords) if name not in self.lines]
+        if 0 < len(absent) < len(keywords):
+            self.fault(absent[0], f"missing; {', '.join(names(keywords))} go together")
+        if not all(name in self.values for name in names(keywords)):
+            return {}
+        return {name: np.array([self.values[name]]) for name in names(keywords)}
+
+    def attitudes(self, columns: Mapping[str, Vector], lines: Sequence[int]) -> Vector:
+        """Quaternions (n, 4) body -> frame of the records in ``lines``."""
+        if "Q1" in columns:
+            parts = np.column_stack([columns[name] for name in ("QC", "Q1", "Q2", "Q3")])
+            lengths = np.linalg.norm(parts, axis=1)
+            for index in np.flatnonzero(np.abs(lengths - 1.0) > UNIT).tolist():
+                problem = f"the quaternion has length {lengths[index]:.6g}; expected 1"
+                self.reader.fault(lines[index], "Q1", problem)
+            turn = parts / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        elif "ANGLE_1" in columns:
+            if "EULER_ROT_SEQ" not in self.lines:
+                self.fault("EULER_ROT_SEQ", "missing; angles need the axes of their turns")
+            angles = [np.radians(columns[name]) for name in names(message.ANGLES)]
+            turn = euler(self.values.get("EULER_ROT_SEQ", "ZXZ"), *angles)
+        else:
+            if not self.forward:
+                problem = "this block leads from the inertial frame to the body"
+                self.fault("REF_FRAME_A", f"the body comes first; {problem}")
+            alpha, delta, angle = (
+                np.radians(columns[name]) for name in names(message.SPIN_AXIS)[:3]
+            )
+            turn = euler("ZXZ", alpha + 0.5 * math.pi, 0.5 * math.pi - delta, angle)
+        return turn if self.forward else attitude.conjugate(turn)
+
+    def rates(self, columns: Mapping[str, Vector], quaternions: Vector) -> Vector:
+        """Rates (n, 3) of the body in its axes, rad/s, NaN for those that no field tells."""
+        if "SPIN_ANGLE_VEL" in columns:
+            return spin_rates(columns, quaternions)
+        if "ANGVEL_X" not in columns:
+            return np.full((len(quaternions), 3), math.nan)
+        rates = np.radians(np.column_stack([columns[name] for name in names(message.ANGVEL)]))
         # The rate "from A to B" is that of B against A (annex F4).
-        rates = np.radians(parts) if forward else -np.radians(parts)
-        faults = len(self.faults)
-        if self.rates_in_body(block, axes):
-            self.body_frame(block, "ANGVEL_FRAME", axes)
+        rates = rates if self.forward else -rates
+        if self.values.get("ANGVEL_FRAME", self.forward):
             return rates
-        if quaternion is not None:
-            return np.asarray(attitude.matrix(quaternion).T @ rates)
-        if len(self.faults) == faults:
-            block.fault(
-                "ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none"
-            )
-        return None
-
-    def _spin(
-        self, quaternion: Vector | None, rates: Vector | None
-    ) -> tuple[Vector | None, Vector | None]:
-        """Fill in values that the other blocks lack; remark where SPIN contradicts them."""
-        block = self._first("SPIN")
-        if block is None or self.endpoints(block, reversible=False) is None:
-            return quaternion, rates
-        angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
-        nutating, with_momentum = block.has(_NUTATION), block.has(message.MOMENTUM)
-        if nutating and with_momentum:
-            block.fault("MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two")
-        if angles is None:
-            return quaternion, rates
-        alpha, delta, angle, about_axis = map(math.radians, angles)
-        turn = euler("ZXZ", alpha + 0.5 * math.pi, 0.5 * math.pi - delta, angle)
-        rate = np.array([0.0, 0.0, about_axis])
-        if nutating and (values := block.numbers(*_NUTATION)) is not None:
-            tilt, phase = math.radians(values[0]), math.radians(values[2])
-            if values[1] <= 0.0:
-                block.fault("NUTATION_PER", f"{values[1]:g} s is no period; expected more than 0")
-                return quaternion, rates
-            self.nutation = tilt if rates is None else None
-            side = math.sin(tilt)
-            momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
-            rate += 2.0 * math.pi / values[1] * momentum
-        elif with_momentum and (values := block.numbers(*message.MOMENTUM)) is not None:
-            right, up, about_momentum = map(math.radians, values)
-            rate += about_momentum * (attitude.matrix(turn).T @ attitude.on_sphere(right, up))
-        off = (
-            0.0
-            if quaternion is None
-            else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
-        )
-        if off > 0.5 * AGREES:
-            self.remark(
-                f"line {block.block.line}: SPIN gives another attitude than the blocks before it, "
-                "which count"
-            )
-        if rates is not None and not np.allclose(
-            rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)
-        ):
-            self.remark(
-                f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts"
-            )
-        return turn if quaternion is None else quaternion, rate if rates is None else rates
-
-    def _inertia(self) -> Vector | None:
-        block = self._first("INERTIA")
-        if block is None:
-            return None
-        self.body_frame(block, "INERTIA_REF_FRAME", block.text("INERTIA_REF_FRAME"))
-        parts = block.numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ")
-        if parts is None:
-            return None
-        xx, yy, zz, xy, xz, yz = parts
-        # Off the diagonal is minus the product (annex F6); + 0.0 makes 0 of -0.
-        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]) + 0.0
-
-    def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:
-        manoeuvres: list[Manoeuvre] = []
-        last: tuple[Epoch, int] | None = None
-        for block in self.by_name["MAN"]:
-            begins = block.epoch("MAN_EPOCH_START", self.system)
-            duration = block.number("MAN_DURATION")
-            torque = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z")
-            mass = block.number("MAN_DELTA_MASS")
-            frame = block.text("MAN_REF_FRAME")
-            self.body_frame(block, "MAN_REF_FRAME", frame)
-            if duration is not None and duration <= 0.0:
-                block.fault("MAN_DURATION", f"{duration:g} s is no duration; expected more than 0")
-            if mass is not None and mass > 0.0:
-                block.fault("MAN_DELTA_MASS", f"{mass:g} kg would be gained; expected 0 or less")
-            if torque is not None and not any(torque):
-                block.fault(
-                    "MAN_TOR_X", "the torque is zero; expected at least one component other than 0"
-                )
-            if begins is not None:
-                if epoch is not None and begins < epoch:
-                    block.fault("MAN_EPOCH_START", "begins before EPOCH, the start of the motion")
-                if last is not None and begins < last[0]:
-                    block.fault(
-                        "MAN_EPOCH_START",
-                        f"begins before the block of line {last[1]}; put them in order",
-                    )
-                last = begins, block.block.line
-            if (
-                begins is not None
-                and epoch is not None
-                and duration is not None
-                and torque is not None
-            ):
-                manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass))
-        return tuple(manoeuvres)
+        return attitude.rotate(attitude.conjugate(quaternions), rates)
 
 
-def euler(sequence: str, *angles: float) -> Vector:
-    """Quaternion of successive turns by ``angles`` (rad) about the axes of the turned body (annex
-    F3).
+def euler(sequence: str, *angles: Vector | float) -> Vector:
+    """Quaternions (..., 4) of successive turns by ``angles`` (...) rad about the axes of the turned
+    body (annex F3).
     """
     turn = np.array([1.0, 0.0, 0.0, 0.0])
     for axis, angle in zip(sequence, angles, strict=True):
-        step = np.zeros(4)
-        step[0], step[1 + "XYZ".index(axis)] = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        half = 0.5 * np.asarray(angle)
+        step = np.zeros((*half.shape, 4))
+        step[..., 0], step[..., 1 + "XYZ".index(axis)] = np.cos(half), np.sin(half)
         turn = attitude.multiply(turn, step)
     return turn
 
 
-AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
-COLUMNS = {
-    "QUATERNION": 4,
-    QUATERNION_ANGVEL: 7,
-}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
+def tensor_of(columns: Mapping[str, Vector]) -> Vector | None:
+    """Inertia (3, 3) of the six fields in their order, kg m²; None of none."""
+    if not columns:
+        return None
+    xx, yy, zz, xy, xz, yz = (float(part[0]) for part in columns.values())
+    # Off the diagonal is minus the product (annex F6); + 0.0 makes 0 of -0.
+    return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]) + 0.0
 
 
-class History(NamedTuple):
-    """Attitude of an object at ``times`` (n,) s after ``epoch``: ``quaternions`` (n, 4) body ->
-    frame, scalar first.
-
-    ``rates`` (n, 3) rad/s in body axes, or None where the message has none.
+def spin_rates(columns: Mapping[str, Vector], quaternions: Vector) -> Vector:
+    """Rates (n, 3) by SPIN_ANGLE_VEL about axis 3 and the nutation about H (annex F5), rad/s; those
+    across axis 3 are NaN where the nutation is not told.
     """
-
-    name: str
-    epoch: Epoch
-    frame: str | None
-    times: Vector
-    quaternions: Vector
-    rates: Vector | None
-    remarks: tuple[str, ...]
-
-    def at(self, time: float) -> tuple[Epoch, Vector, Vector | None]:
-        """Epoch, quaternion and rates of the first record from ``time`` s on; raises BadRequest
-        past the last.
-        """
-        index = int(np.searchsorted(self.times, time))
-        if index == len(self.times):
-            raise BadRequest(
-                f"the history ends {self.times[-1]:.6g} s after its first record: "
-                "expected a time in it"
-            )
-        rates = None if self.rates is None else self.rates[index]
-        return self.epoch.plus(float(self.times[index])), self.quaternions[index], rates
-
-
-def is_history(path: str) -> bool:
-    """True for a file that begins as an AEM does, not for standard input; raises CannotRead."""
-    beginning = b"" if path == "-" else read_bytes(path, 200)
-    return beginning.lstrip(message.BEFORE).startswith(AEM_VERSION.encode())
-
-
-def read_history(path: str) -> History:
-    """The history in a message; raises CannotRead, or FaultyFile with its faults."""
-    reader = _HistoryReader(path)
-    segments = [block for block in reader.blocks if block.name in ("META", "DATA")]
-    for metadata, records in zip(segments[::2], segments[1::2], strict=False):
-        if (metadata.name, records.name) != ("META", "DATA"):
-            reader.fault(metadata.line, metadata.name, "expected META_START … META_STOP, then data")
-            break
-        reader.take(metadata, records)
-    if not segments or len(segments) % 2:
-        reader.fault(1, "DATA_START", "missing; each block of metadata is followed by data")
-    if not reader.faults and not reader.times:
-        reader.fault(segments[0].line, "DATA_START", "no records")
-    if reader.faults:
-        raise FaultyFile(reader.faults)
-    first = reader.times[0]
-    times, turns = (
-        np.array([time.since(first) for time in reader.times]),
-        np.array(reader.quaternions),
-    )
-    rates = None if reader.rates is None else np.array(reader.rates)
-    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
-
-
-class _HistoryReader(MessageReader):
-    def __init__(self, path: str) -> None:
-        super().__init__(path, AEM_VERSION)
-        self.name = "UNKNOWN"
-        self.times: list[Epoch] = []
-        self.quaternions: list[Vector] = []
-        self.rates: list[Vector] | None = []
-
-    def take(self, metadata: MessageBlock, records: MessageBlock) -> None:
-        block = Checked(self, metadata, message.AEM_METADATA)
-        self.name = (block.text("OBJECT_NAME") or self.name)[:LONGEST_NAME]
-        self.take_system(block)
-        forward = self.endpoints(block)
-        kind = block.text("ATTITUDE_TYPE")
-        if kind is not None and kind not in COLUMNS:
-            block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
-        axes = block.text("ANGVEL_FRAME")
-        turning = kind == QUATERNION_ANGVEL
-        if turning and axes is None:
-            block.fault(
-                "ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates"
-            )
-        in_body = not turning or axes is None or self.rates_in_body(block, axes)
-        if self.faults or kind is None or forward is None:
-            return
-        if not turning:
-            self.rates = None
-        for record in records.entries:
-            self._record(
-                record.line, record.value.split(), COLUMNS[kind], forward=forward, in_body=in_body
-            )
-
-    def _record(
-        self, line: int, cells: list[str], columns: int, *, forward: bool, in_body: bool
-    ) -> None:
-        try:
-            time = Epoch.parse(cells[0], self.system)
-            numbers = [float(cell) for cell in cells[1:]]
-            if len(numbers) != columns or not all(map(math.isfinite, numbers)):
-                raise ValueError(f"expected a time and {columns} numbers")
-            parts = message.unit_quaternion([numbers[3], *numbers[:3]])
-        except ValueError as wrong:
-            self.fault(line, "DATA", str(wrong))
-            return
-        if self.times and time == self.times[-1]:  # a segment begins where the one before ends
-            return
-        if self.times and time < self.times[-1]:
-            self.fault(line, "DATA", "comes before the record above; put them in order")
-            return
-        quaternion = parts if forward else attitude.conjugate(parts)
-        self.times.append(time)
-        self.quaternions.append(quaternion)
-        if self.rates is not None:
-            rates = np.radians(numbers[4:]) * (1.0 if forward else -1.0)
-            self.rates.append(
-                rates if in_body else np.asarray(attitude.matrix(quaternion).T @ rates)
-            )
-
-
-ALIKE = 1e-9  # relative difference up to which torques count as transverse, and as of one magnitude
-
-_BLOCKS = {"inertia": "INERTIA", "omega0": "ANGVEL", "attitude": "EPOCH", "steerable": "MAN"}
-"""Block of the message behind each part of the spacecraft file."""
-
-
-SAME_NUTATION, ROUNDED = 0.01, 1e-5
-"""Share of a nutation, and rad besides, by which that of the inertia may differ: messages round."""
-
-
-def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
-    """Text of the spacecraft file, the spacecraft, and the manoeuvres; FaultyFile, by lines of the
-    message.
-    """
-    if contents.tensor is None:
-        problem = (
-            "missing; a spacecraft file needs moments of inertia: "
-            "--into merges the message into one that has"
-        )
-        raise FaultyFile([Fault(path, 1, 1, "INERTIA", f"{problem} them")])
-    _, axes = principal_axes(contents.tensor)
-    torques = [axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
-    sizes = [float(np.linalg.norm(torque)) for torque in torques]
-    transverse = all(
-        abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True)
-    )
-    alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
-    # Texts are in double quotes, in which JSON and YAML agree.
-    lines = [
-        f"# From the attitude parameter message {printable(path)}; numbers as given there.",
-        "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
-        f"name: {json.dumps(contents.name, ensure_ascii=False)}",
-    ]
-    if contents.object_id is not None:
-        lines.append(f"object_id: {json.dumps(contents.object_id, ensure_ascii=False)}")
-    rates = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in contents.rates.tolist())
-    lines += [*_inertia(contents.tensor), f"omega0: [{rates}]"]
-    if contents.quaternion is not None:
-        lines += [
-            "attitude:",
-            f"  epoch: {contents.epoch.text.rstrip('0').rstrip('.')}Z",
-            f"  frame: {contents.frame}",
-            f"  quaternion: {contents.quaternion.tolist()}   # body -> frame, scalar first",
-        ]
-    lines += _actuators(contents.manoeuvres, sizes[0] if alike else None)
-    text = "\n".join(lines) + "\n"
-    # Pulses of the steerable torquer; one that overlaps another has a name of its own.
-    pulses: list[Pulse] = []
-    free = 0.0
-    for number, (manoeuvre, torque) in enumerate(
-        zip(contents.manoeuvres, torques, strict=True), start=1
-    ):
-        start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
-        alone = start >= free - 1e-9
-        spent = None if used is None else -used
-        channel = STEERABLE if alone else f"MAN{number}"
-        pulses.append(
-            Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent)
-        )
-        free = max(free, start + lasts) if alone else free
-    try:
-        return text, read_spacecraft(text, path), Schedule(tuple(pulses))
-    except FaultyFile as wrong:  # its faults are those of the message
-        faults = []
-        for fault in wrong.faults:
-            block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
-            line = contents.lines.get(
-                block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1
-            )
-            faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
-        raise FaultyFile(faults) from None
-
-
-def contradictions(contents: ApmContents, spacecraft: Spacecraft) -> list[str]:
-    """Contradictions between the nutation stated in the message and that by inertia and period."""
-    stated, follows = contents.nutation, spacecraft.widest.nutation
-    if stated is None or abs(follows - abs(stated)) <= ROUNDED + SAME_NUTATION * abs(stated):
-        return []
-    return [
-        f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, "
-        "but with this INERTIA NUTATION_PER gives one "
-        f"of {math.degrees(follows):.4g} deg, which the file has; one of the three is wrong"
-    ]
-
-
-def ratio_doubts(contents: ApmContents, spacecraft: Spacecraft) -> list[str]:
-    """Doubt where spin, nutation and period of SPIN are those of another C/A than that of the
-    ``body`` merged into.
-    """
-    if not contents.nutation or spacecraft.spin == 0.0:
-        return []
-    first, second, third = contents.rates.tolist()
-    implied = math.hypot(first, second) / (abs(third) * math.tan(abs(contents.nutation)))
-    ratio = abs(spacecraft.axial / (spacecraft.inertia.A * spacecraft.spin))
-    if abs(implied - ratio) <= SAME_NUTATION * ratio:
-        return []
-    return [
-        f"spin, nutation and period of SPIN are those of C/A = {implied:.4g}, "
-        f"and the file has {ratio:.4g}: "
-        f"the spin and the nutation of {math.degrees(abs(contents.nutation)):.4g} deg are kept, "
-        "not the period"
-    ]
-
-
-def _inertia(tensor: Vector) -> list[str]:
-    first, second, third = np.diag(tensor).tolist()
-    if first == second and not (tensor - np.diag(np.diag(tensor))).any():
-        return [f"inertia: {{A: {first!r} kg m^2, C: {third!r} kg m^2}}"]
-    rows = (", ".join(f"{part!r} kg m^2" for part in row) for row in tensor.tolist())
-    return ["inertia:", "  tensor:", *(f"    - [{row}]" for row in rows)]
-
-
-def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list[str]:
-    if not manoeuvres:
-        return [
-            "# The message fires nothing; without thrusters an ideal steerable impulse is assumed."
-        ]
-    if torquer is not None:
-        first = round(manoeuvres[0].start, DIGITS)
-        return [
-            (
-                "# All manoeuvres of the message are transverse and of one torque, "
-                "as a steerable torquer gives them."
-            ),
-            f"steerable: {{torque: {torquer!r} N m}}",
-            *[f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"]
-            * bool(first),
-        ]
-    distinct = {tuple(manoeuvre.torque.tolist()): None for manoeuvre in manoeuvres}
-    return [
-        (
-            "# The torques that the message fires, as thrusters to begin with; without any, "
-            "an ideal steerable impulse is"
-        ),
-        "# assumed.",
-        "# thrusters:",
-        *(
-            (
-                f"#   - {{name: MAN{number}, torque: "
-                f"[{', '.join(f'{part!r} N m' for part in torque)}]}}"
-            )
-            for number, torque in enumerate(distinct, start=1)
-        ),
-    ]
-
-
-def merged_text(
-    source: Source, contents: ApmContents | History, at: float = 0.0, *, inertia: bool
-) -> str:
-    """The text of a spacecraft file with the motion of a message, of a history the record from
-    ``at`` s on.
-
-    Of SPIN with a nutation the spin and the angle; see `ratio_doubts`.
-
-    Raises BadRequest where the message has no ``inertia`` to merge, and where the file would be
-    none for nutdamp.
-    """
-    given: Vector | None
-    if isinstance(contents, ApmContents):
-        epoch, turn, given, tensor = (
-            contents.epoch,
-            contents.quaternion,
-            contents.rates,
-            contents.tensor,
-        )
+    own = np.radians(columns["SPIN_ANGLE_VEL"])
+    if "NUTATION" in columns:
+        tilt, phase = np.radians(columns["NUTATION"]), np.radians(columns["NUTATION_PHASE"])
+        side = np.sin(tilt)
+        about = 2.0 * math.pi / columns["NUTATION_PER"]
+        momentum = np.array([side * np.cos(phase), -side * np.sin(phase), np.cos(tilt)])
+    elif "NUTATION_VEL" in columns:
+        right, up, about = (np.radians(columns[name]) for name in names(message.MOMENTUM))
+        towards = [np.cos(up) * np.cos(right), np.cos(up) * np.sin(right), np.sin(up)]
+        momentum = attitude.rotate(attitude.conjugate(quaternions), np.array(towards).T).T
     else:
-        (epoch, turn, given), tensor = contents.at(at), None
-    if inertia and tensor is None:
-        raise BadRequest("the message has no inertia to merge")
-    before = source.read(lambda _: None)
-    after = before
-    if inertia and tensor is not None:
-        after = replace(after, inertia=Inertia(*principal_axes(tensor), before.inertia.wheel))
-    axes = after.inertia.axes
-    after = replace(after, omega0=axes.T @ (before.rates if given is None else given))
-    if isinstance(contents, ApmContents) and contents.nutation:
-        first, second, third = after.inertia.momentum(after.omega0).tolist()
-        share = abs(third) * math.tan(abs(contents.nutation)) / math.hypot(first, second)
-        after = replace(
-            after, omega0=after.omega0 * (share, share, 1.0)
-        )  # the angle stays, whatever C/A the file has
-    quaternion = before.initial.quaternion
-    if turn is not None:
-        quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
-        after = replace(
-            after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), contents.frame)
+        return np.column_stack([np.full((len(own), 2), math.nan), own])
+    return np.asarray((about * momentum).T + np.outer(own, [0.0, 0.0, 1.0]))
+
+
+Motion = tuple[Vector, Vector, Vector]
+"""Records without jumps: quaternions (n, 4), none where the attitude is not known, rates (n, 3)
+rad/s and nutations (n,) rad, NaN where they are not told.
+"""
+
+
+def is_message(path: str) -> bool:
+    """True for a file that begins as a message or as XML does, not for standard input; raises
+    CannotRead.
+    """
+    beginning = (b"" if path == "-" else read_bytes(path, 200)).lstrip(BEFORE)
+    return beginning[:6].lower() in (b"ccsds_", b"stk.v.") or beginning.startswith(b"<")
+
+
+def read_message(path: str) -> Contents:
+    """The contents of an attitude message; raises CannotRead, or FaultyFile with every fault of the
+    file.
+    """
+    reader = MessageReader(path)
+    line, first = reader.tokens[0] if reader.tokens else (1, "")
+    if _STK.fullmatch(first):
+        return _stk(reader)
+    word, _, version = (part.strip() for part in first.partition("="))
+    if word not in FORMS or version != VERSION:
+        expected = f"{listed([*FORMS], 'or')} = {VERSION}, or stk.v.11.0 (.a)"
+        reader.fault(
+            line, "", f"{first[:40]!r} begins no message that is read; expected {expected}"
         )
-    later = Later(before, after, quaternion)
+        raise FaultyFile([*reader.faults.values()])
+    form = FORMS[word]
+    outside, *blocks = _sections(reader, form)
+    about = Fields(reader, outside, form.outside)
+    return {"APM": _apm, "AEM": _aem, "ACM": _acm}[form.name](reader, about, blocks)
 
-    def edits(tree: Node) -> Edits:
-        if inertia:
-            yield from inertia_edits(tree, later)
-        if given is not None:
-            yield from rate_edits(tree, later)
-        if turn is not None:
-            yield from attitude_edits(tree, later)
 
-    text = carry_text(*source[:3], edits)
-    try:
-        Source(text, source.name).read(lambda _: None)
-    except FaultyFile as wrong:
-        listed = "; ".join(f"{fault.where}: {fault.problem}" for fault in wrong.faults)
-        raise BadRequest(f"the message does not fit {source.name}: {listed}") from None
-    return text
+def _sections(reader: MessageReader, form: Form) -> list[BlockLines]:
+    """Blocks of a message in KVN in their order, behind what is outside of them."""
+    sections = [BlockLines("", 1, [], [])]
+    within: BlockLines | None = None
+    for line, content in reader.tokens[1:]:
+        edge, pair = _EDGE.fullmatch(content), _PAIR.fullmatch(content)
+        layout = form.blocks.get(within.name, Layout("")) if within else Layout("")
+        if within is not None and content == f"{within.name}_STOP":
+            within = None
+        elif layout.skipped:
+            continue
+        elif pair is not None:
+            (within or sections[0]).entries.append((line, pair[1], pair[2], pair[3]))
+        elif edge is not None and edge[2] == "START":
+            if within is not None:
+                reader.fault(line, content, f"{within.name}_STOP is missing before it")
+            within = BlockLines(edge[1], line, [], [])
+            if edge[1] not in form.blocks:
+                known = ", ".join(f"{name}_START" for name in form.blocks)
+                reader.fault(line, content, f"unknown block; known are {known}")
+                continue
+            if edge[1] in reader.lines and not form.blocks[edge[1]].repeated:
+                problem = "a second block of this kind; which one counts is not said"
+                reader.fault(line, edge[1], problem)
+            if form.blocks[edge[1]].skipped:
+                reader.remarks.append(f"{edge[1]} blocks are not read")
+            sections.append(within)
+            reader.lines.setdefault(edge[1], line)
+        elif edge is not None:
+            reader.fault(
+                line, content, f"expected {within.name}_STOP" if within else "no block is open"
+            )
+        elif within is not None and layout.rows:
+            within.rows.append((line, content.split()))
+        else:
+            reader.fault(line, "", f"{content[:40]!r} is no KEYWORD = value")
+    if within is not None:
+        reader.fault(within.line, f"{within.name}_START", f"{within.name}_STOP is missing")
+    return sections
+
+
+def _take_rows(
+    reader: MessageReader,
+    block: Fields,
+    section: BlockLines,
+    keywords: tuple[Keyword, ...],
+    zero: Epoch | None = None,
+) -> None:
+    """Take the records of data lines: a time, or s after ``zero``, and a number for each of the
+    ``keywords``.
+    """
+    lines: list[int] = []
+    table: list[list[float]] = []
+    for line, (first, *cells) in section.rows:
+        where = section.name
+        try:
+            if len(cells) != len(keywords):
+                expected = f"a time and {', '.join(names(keywords))}"
+                raise ValueError(f"{len(cells)} numbers behind the time; expected {expected}")
+            values = []
+            for keyword, cell in zip(keywords, cells, strict=True):
+                where = keyword.name
+                values.append(reader.value(keyword, cell))
+            where = "EPOCH"
+            if zero is None or not _NUMBER.fullmatch(first):
+                time = Epoch.parse(first, reader.system)
+            else:
+                time = zero.plus(float(first))
+            if reader.epochs and time < reader.epochs[-1]:
+                raise ValueError("comes before the record above; put them in order")
+        except ValueError as wrong:
+            reader.fault(line, where, str(wrong))
+            continue
+        if not reader.epochs or time > reader.epochs[-1]:  # blocks begin where others end
+            reader.epochs.append(time)
+            lines.append(line)
+            table.append(values)
+    if table:
+        columns = dict(zip(names(keywords), np.array(table).T, strict=True))
+        quaternions = block.attitudes(columns, lines)
+        nutations = np.radians(columns.get("NUTATION", np.full(len(table), math.nan)))
+        reader.motions.append((quaternions, block.rates(columns, quaternions), nutations))
+
+
+def _contents(
+    reader: MessageReader,
+    about: Fields,
+    tensor: Vector | None = None,
+    mass: float | None = None,
+    manoeuvres: tuple[Manoeuvre, ...] = (),
+) -> Contents:
+    """Contents of the message with the records taken; raises FaultyFile."""
+    if not reader.faults and not reader.motions and tensor is None:
+        reader.fault(1, "", "no records of attitude")
+    if reader.faults:
+        raise FaultyFile([*reader.faults.values()])
+    motions = [(np.empty((0, 4)), np.empty((0, 3)), np.empty(0)), *reader.motions]
+    quaternions, rates, nutations = (np.concatenate(part) for part in zip(*motions, strict=True))
+    identity = about.values.get("OBJECT_ID", about.values.get("INTERNATIONAL_DESIGNATOR"))
+    epoch = reader.epochs[0]
+    return Contents(
+        name=about.values.get("OBJECT_NAME", "UNKNOWN")[:LONGEST_NAME],
+        object_id=None if identity in (None, "UNKNOWN") else identity[:LONGEST_NAME],
+        epoch=epoch,
+        frame=reader.frames.get(False),
+        times=np.array([each.since(epoch) for each in reader.epochs])[: len(rates)],
+        quaternions=quaternions,
+        rates=rates,
+        nutations=nutations,
+        stretches=np.repeat(np.arange(len(motions)), [len(part[1]) for part in motions]),
+        tensor=tensor,
+        mass=mass,
+        manoeuvres=manoeuvres,
+        lines=reader.lines,
+        remarks=tuple(dict.fromkeys(reader.remarks)),
+    )
+
+
+def _apm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Contents:
+    """Attitude and rates from QUAT (or EULER) and ANGVEL, or else from SPIN."""
+    order = list(message.APM_BLOCKS)
+    epoch: Epoch | None = about.values.get("EPOCH")
+    quaternion, rates, nutation = (np.full(shape, math.nan) for shape in ((1, 4), (1, 3), 1))
+    tensor: Vector | None = None
+    manoeuvres: list[Manoeuvre] = []
+    for section in sorted(sections, key=lambda section: order.index(section.name)):
+        block = Fields(reader, section, message.APM_BLOCKS[section.name].keywords)
+        columns = block.columns(message.APM_GROUPS[section.name])
+        if not columns:
+            continue
+        match section.name:
+            case "QUAT" | "EULER" if np.isnan(quaternion).any():
+                quaternion = block.attitudes(columns, [block.lines.get("Q1", 1)])
+            case "ANGVEL":
+                rates = block.rates(columns, quaternion)
+                if np.isnan(rates).any():
+                    problem = "rates in an inertial frame need the attitude of another block"
+                    block.fault("ANGVEL_FRAME", problem)
+            case "SPIN":
+                nutating, turning = (
+                    block.columns(keywords) for keywords in (message.NUTATION, message.MOMENTUM)
+                )
+                if nutating and turning:
+                    problem = "given together with NUTATION; keep one set of the two"
+                    block.fault("MOMENTUM_ALPHA", problem)
+                columns |= nutating or turning
+                turn = block.attitudes(columns, [])
+                spun = np.nan_to_num(spin_rates(columns, turn))
+                where = f"line {section.line}: SPIN gives"
+                if abs(float(np.vdot(quaternion, turn))) < SAME:
+                    other = "another attitude than the blocks before it, which count"
+                    reader.remarks.append(f"{where} {other}")
+                if np.linalg.norm(rates - spun) > AGREES * np.linalg.norm(rates):
+                    reader.remarks.append(f"{where} other rates than ANGVEL, which counts")
+                if np.isnan(rates).any():
+                    rates, nutation = spun, np.radians(columns.get("NUTATION", nutation))
+                quaternion = np.where(np.isnan(quaternion), turn, quaternion)
+            case "INERTIA":
+                tensor = tensor_of(columns)
+            case "MAN":
+                torque = np.concatenate(list(columns.values()))
+                start, duration, used = (
+                    block.values.get(f"MAN_{key}")
+                    for key in ("EPOCH_START", "DURATION", "DELTA_MASS")
+                )
+                if not torque.any():
+                    problem = "the torque is zero; expected a component other than 0"
+                    block.fault("MAN_TOR_X", problem)
+                if epoch is not None and start is not None and start < epoch:
+                    problem = "begins before EPOCH, the start of the motion"
+                    block.fault("MAN_EPOCH_START", problem)
+                elif epoch is not None and start is not None:
+                    manoeuvres.append(Manoeuvre(start.since(epoch), duration or 0.0, torque, used))
+    if np.isnan(rates).any() and not reader.faults:
+        problem = "missing; without an ANGVEL or a SPIN block the motion is not known"
+        reader.fault(1, "ANGVEL", problem)
+    if np.isnan(quaternion).any():
+        reader.remarks.append("the message gives no attitude: frame and epoch are left out")
+    reader.epochs += [] if epoch is None else [epoch]
+    reader.motions.append((quaternion, rates, nutation))
+    manoeuvres.sort(key=lambda manoeuvre: manoeuvre.start)
+    return _contents(reader, about, tensor, manoeuvres=tuple(manoeuvres))
+
+
+def _aem(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Contents:
+    """Blocks of metadata, each with the data lines that follow it."""
+    expected = ["META", "DATA"] * max(len(sections) // 2, 1)
+    if [section.name for section in sections] != expected:
+        reader.fault(1, "META_START", "expected pairs of META_START … and DATA_START …")
+        raise FaultyFile([*reader.faults.values()])
+    for metadata, data in zip(sections[::2], sections[1::2], strict=True):
+        block = Fields(reader, metadata, message.AEM_METADATA)
+        Fields(reader, data, ())
+        about = about if "OBJECT_NAME" in about.values else block
+        kind = block.values.get("ATTITUDE_TYPE")
+        if kind is None:
+            continue
+        if kind.endswith("ANGVEL") and "ANGVEL_FRAME" not in block.lines:
+            block.fault("ANGVEL_FRAME", f"missing; {kind} needs the frame of the rates")
+        _take_rows(reader, block, data, message.AEM_RECORDS[kind].keywords[1:])
+    return _contents(reader, about)
+
+
+def _acm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Contents:
+    """Attitude of ATT, mass and inertia of PHYS; covariances and manoeuvres are not read."""
+    metadata = next((part for part in sections if part.name == "META"), about.section)
+    about = Fields(reader, metadata, message.ACM_BLOCKS["META"].keywords)
+    zero = about.values.get("EPOCH_TZERO")
+    tensor = mass = None
+    for section in sections:
+        block = Fields(reader, section, message.ACM_BLOCKS[section.name].keywords)
+        if section.name == "PHYS":
+            tensor = tensor_of(block.columns(message.INERTIA))
+            mass = block.values.get("WET_MASS")
+            if "CP" in block.values:
+                unused = "CP is the center of pressure, from the center of mass: not used"
+                reader.remarks.append(unused)
+        elif "ATT_TYPE" in block.values:
+            rates = message.ACM_RATES[block.values.get("RATE_TYPE", "NONE")]
+            keywords = (*message.ACM_ATTITUDES[block.values["ATT_TYPE"]], *rates)
+            if block.values.get("NUMBER_STATES", len(keywords)) != len(keywords):
+                needed = f"{len(keywords)}: {', '.join(names(keywords))}"
+                block.fault("NUMBER_STATES", f"expected {needed}")
+            _take_rows(reader, block, section, keywords, zero)
+    reader.epochs += [] if zero is None or reader.epochs else [zero]
+    return _contents(reader, about, tensor, mass)
+
+
+def _stk(reader: MessageReader) -> Contents:
+    """Keywords, the line that names the columns, and data lines; case does not count."""
+    known = {word.casefold(): word for word in (*names(message.STK_KEYWORDS), *message.STK_ROWS)}
+    keywords, data = BlockLines("", 1, [], []), BlockLines("", 1, [], [])
+    for line, content in reader.tokens[1:]:
+        first, *rest = content.partition("#")[0].split() or ["begin"]
+        word = known.get(first.casefold(), first)
+        if word.casefold() == "end":
+            break
+        if data.name:
+            data.rows.append((line, [first, *rest]))
+        elif word.casefold().startswith("attitudetime"):
+            data = data._replace(name=word, line=line)
+        elif word.casefold() != "begin":
+            keywords.entries.append((line, word, " ".join(rest), None))
+    block = Fields(reader, keywords, message.STK_KEYWORDS)
+    if data.name not in message.STK_ROWS:
+        expected = f"expected a line {listed(list(message.STK_ROWS), 'or')}"
+        reader.fault(data.line, data.name, f"no columns that are read; {expected}")
+        raise FaultyFile([*reader.faults.values()])
+    if block.values.get("NumberOfAttitudePoints", len(data.rows)) != len(data.rows):
+        block.fault("NumberOfAttitudePoints", f"there are {len(data.rows)}")
+    _take_rows(reader, block, data, message.STK_ROWS[data.name], block.values.get("ScenarioEpoch"))
+    return _contents(reader, block)

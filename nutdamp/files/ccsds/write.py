@@ -1,5 +1,5 @@
 """Attitude parameter (APM), attitude ephemeris (AEM) and orbit parameter messages (OPM, CCSDS
-502.0-B-3) written.
+502.0-B-3) written from plans, and spacecraft files written from messages.
 
 Body axes are those of the spacecraft file, which messages call `message.BODY_FRAME`. Nutation by
 annex F5 is the steady motion of bodies symmetric about axis 3: others have the spin alone.
@@ -7,33 +7,232 @@ annex F5 is the steady motion of bodies symmetric about axis 3: others have the 
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterator
+import unicodedata
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from decimal import Decimal
+from itertools import groupby
+from operator import attrgetter
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
-from nutdamp.common.time import Epoch
-from nutdamp.errors import BadRequest
+from nutdamp.common.time import DIGITS, Epoch
+from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
 from nutdamp.files.ccsds import message
 from nutdamp.files.ccsds.message import (
+    APM_BLOCKS,
     BODY_FRAME,
+    LAYOUTS,
     QUATERNION_ANGVEL,
     SPIN,
     SPIN_NUTATION_MOM,
-    block,
-    label,
+    VERSION,
+    Keyword,
+    Layout,
 )
-from nutdamp.files.export import AttitudeSegment, Reference, interpolated
+from nutdamp.files.ccsds.read import Contents, Manoeuvre
+from nutdamp.files.editing import (
+    Edit,
+    Edits,
+    Later,
+    attitude_edits,
+    carry_text,
+    epoch_after,
+    inertia_edits,
+    rate_edits,
+)
+from nutdamp.files.export import AXES, AttitudeSegment, Reference, interpolated
+from nutdamp.files.reader import Source, read_spacecraft
+from nutdamp.files.yaml import Node
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import momentum_gained
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
+from nutdamp.physics.body import principal_axes
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
+
+
+class MessageEntry(NamedTuple):
+    """A keyword (none in data lines) with its value, as texts.
+
+    ``tag`` wraps it in XML besides that of the block.
+    """
+
+    keyword: str
+    value: str
+    unit: str | None = None
+    tag: str = ""
+
+
+class MessageBlock(NamedTuple):
+    """Keywords that belong together; ``name`` is that of the layout, empty outside of blocks."""
+
+    name: str
+    entries: tuple[MessageEntry, ...]
+    comments: tuple[str, ...] = ()
+
+
+class Segment(NamedTuple):
+    """Metadata and the data that they describe: blocks (APM), or records of the layout ``record``
+    (AEM).
+    """
+
+    metadata: MessageBlock
+    blocks: tuple[MessageBlock, ...] = ()
+    records: tuple[tuple[str, ...], ...] = ()
+    record: Layout | None = None
+
+
+class Message(NamedTuple):
+    """A whole message; ``kind`` is APM, AEM or OPM."""
+
+    kind: str
+    header: MessageBlock
+    segments: tuple[Segment, ...]
+
+
+LONGEST_LINE = 254  # ASCII characters that a line may have
+SIGNIFICANT = 16  # most digits that a number may have
+
+VERSION_OF = {"APM": VERSION, "AEM": VERSION, "OPM": "3.0"}
+
+Values = Sequence[str | float | None]
+
+
+def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: str) -> MessageBlock:
+    """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the
+    unit of the table.
+    """
+    entries = tuple(
+        MessageEntry(
+            keyword.name,
+            value if isinstance(value, str) else number(value),
+            keyword.unit,
+            keyword.tag,
+        )
+        for keyword, value in zip(keywords, values, strict=False)
+        if value is not None
+    )
+    return MessageBlock(name, entries, tuple(comment(text) for text in comments))
+
+
+def number(value: float) -> str:
+    """A number as the standard has it: at most 16 digits, at least one on either side of the point,
+    no -0.
+    """
+    if value == 0.0:
+        return "0.0"
+    exact = Decimal(repr(float(value)))
+    if len(exact.as_tuple().digits) > SIGNIFICANT:
+        exact = Decimal(f"{value:.{SIGNIFICANT - 1}e}")
+    exact = exact.normalize()
+    fixed = f"{exact:f}"
+    if "." not in fixed:
+        fixed += ".0"
+    if sum(character.isdigit() for character in fixed) <= SIGNIFICANT:
+        return fixed
+    sign, digits, _ = exact.as_tuple()
+    first, *rest = (str(digit) for digit in digits)
+    return f"{'-' * sign}{first}.{''.join(rest) or '0'}E{exact.adjusted():+03d}"
+
+
+def label(text: str) -> str:
+    """A name as a value of the standard: printable ASCII in capitals; UNKNOWN where nothing is
+    left.
+    """
+    return " ".join(_ascii(text).upper().split())[:200] or "UNKNOWN"
+
+
+def comment(text: str) -> str:
+    """A comment as the standard has it: printable ASCII, short enough for one line."""
+    return _ascii(text)[: LONGEST_LINE - len("COMMENT ")]
+
+
+def _ascii(text: str) -> str:
+    """Text in ASCII: accents and other characters are dropped."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return "".join(character if character.isprintable() else " " for character in plain)
+
+
+SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
+
+
+def to_xml(message: Message) -> str:
+    """The text of a message."""
+    # Namespace and attributes are written as the standard prints them.
+    versioned = {"id": f"CCSDS_{message.kind}_VERS", "version": VERSION_OF[message.kind]}
+    root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, **versioned})
+    _fill(SubElement(root, "header"), message.header)
+    body = SubElement(root, "body")
+    for segment in message.segments:
+        place = SubElement(body, "segment")
+        _fill(SubElement(place, "metadata"), segment.metadata)
+        data = SubElement(place, "data")
+        for part in segment.blocks:
+            _fill(SubElement(data, LAYOUTS[part.name].tag) if part.name else data, part)
+        for record in segment.records:
+            assert segment.record is not None
+            place = SubElement(SubElement(data, "attitudeState"), segment.record.tag)
+            _fill(place, block("", segment.record.keywords, record))
+    indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
+
+
+def _fill(place: Element, block: MessageBlock) -> None:
+    for comment in block.comments:
+        SubElement(place, "COMMENT").text = comment
+    for tag, group in groupby(block.entries, attrgetter("tag")):
+        parent = SubElement(place, tag) if tag else place
+        for entry in group:
+            SubElement(
+                parent, entry.keyword, {"units": entry.unit} if entry.unit else {}
+            ).text = entry.value
+
+
+def to_kvn(message: Message) -> str:
+    """The text of a message."""
+    lines = [f"CCSDS_{message.kind}_VERS = {VERSION_OF[message.kind]}", *_kvn_lines(message.header)]
+    for segment in message.segments:
+        metadata = _kvn_lines(segment.metadata)
+        lines += (
+            ["", "META_START", *metadata, "META_STOP"] if message.kind == "AEM" else ["", *metadata]
+        )
+        for block in segment.blocks:
+            inside = _kvn_lines(block)
+            named = block.name in APM_BLOCKS
+            lines += (
+                ["", f"{block.name}_START", *inside, f"{block.name}_STOP"]
+                if named
+                else ["", *inside]
+            )
+        if segment.records:
+            lines += [
+                "",
+                "DATA_START",
+                *(" ".join(record) for record in segment.records),
+                "DATA_STOP",
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def _kvn_lines(block: MessageBlock) -> list[str]:
+    width = max((len(entry.keyword) for entry in block.entries), default=0)
+    return [
+        *(f"COMMENT {comment}" for comment in block.comments),
+        *(
+            f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "")
+            for word, value, unit, *_ in block.entries
+        ),
+    ]
+
 
 AXIS = 1e-12  # tilt in rad up to which the symmetry axis counts as the third axis of the file
 
@@ -78,6 +277,19 @@ def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str
     }
 
 
+def euler_rate(spin: dict[str, Vector], third: float) -> str:
+    """Comment on SPIN_ANGLE_VEL at the first moment, which reads like a fault beside the spin: of
+    a body with C/A = 4/3 it is -30 deg/s at a spin of 90 deg/s.
+
+    ``third`` is ω3 in rad/s.
+    """
+    rate = float(spin["SPIN_ANGLE_VEL"][0])
+    return (
+        "SPIN_ANGLE_VEL is the Euler rate about the axis, psi-dot = w3 - phi-dot cos theta: "
+        f"{rate:.6g} deg/s. The spin of the body, w3, is {math.degrees(third):.6g} deg/s."
+    )
+
+
 def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
     """Right ascension in [0, 2π) and declination of vectors (n, 3), rad;
     the former is 0 at a pole.
@@ -90,7 +302,7 @@ def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
 ORIGINATOR = "NUTDAMP"
 
 
-def apm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
+def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which
     has no duration.
     """
@@ -104,27 +316,28 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
     # turns vectors.
     scalar, *vector = quaternion.tolist()
     blocks = [
-        block("", (message.Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(spacecraft)),
+        block("", (Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(spacecraft)),
         _block("QUAT", [*frames, *vector, scalar]),
         _block("ANGVEL", [*frames, BODY_FRAME, *np.degrees(rates)]),
     ]
     if spinning(spacecraft.inertia):
+        momentum = message.names(message.MOMENTUM)
         spin = spin_values(spacecraft.inertia, *(values[None] for values in motion))
-        values = [float(value[0]) for name, value in spin.items() if name not in message.MOMENTUM]
-        blocks.append(_block("SPIN", [*frames, *values]))
+        values = [float(value[0]) for name, value in spin.items() if name not in momentum]
+        blocks.append(_block("SPIN", [*frames, *values], euler_rate(spin, rates[2])))
     # The products are minus the entries off the diagonal (annex F6).
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = spacecraft.inertia.tensor.tolist()
     blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz]))
     blocks += _manoeuvres("MAN", plan, reference)
     about = block("", message.APM_METADATA, [*_identity(spacecraft), None, "UTC"])
-    return message.Message("APM", _header(plan, created), (message.Segment(about, tuple(blocks)),))
+    return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
 
 
-def _block(name: str, values: message.Values, *comments: str) -> message.MessageBlock:
-    return block(name, message.LAYOUTS[name].keywords, values, *comments)
+def _block(name: str, values: Values, *comments: str) -> MessageBlock:
+    return block(name, LAYOUTS[name].keywords, values, *comments)
 
 
-def _header(plan: Plan, created: Epoch) -> message.MessageBlock:
+def _header(plan: Plan, created: Epoch) -> MessageBlock:
     moment = created.text.partition(".")[0]
     values = [None, moment, ORIGINATOR, label(f"{plan.scheme}-{moment}")]
     about = f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}"
@@ -159,7 +372,7 @@ def _unsaid(spacecraft: Spacecraft) -> list[str]:
     return [remark for remark, holds in remarks.items() if holds]
 
 
-def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[message.MessageBlock]:
+def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[MessageBlock]:
     """Blocks of the pulses: MAN with their torques, MANEUVER with their velocity changes."""
     for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
         timing = (reference.epoch.plus(max(pulse.start, 0.0)).text, pulse.on_time)
@@ -205,7 +418,7 @@ def aem(
     reference: Reference,
     created: Epoch,
     kind: str = QUATERNION_ANGVEL,
-) -> message.Message:
+) -> Message:
     """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges
     of pulses.
 
@@ -217,7 +430,7 @@ def aem(
     segments = tuple(
         _segment(spacecraft, stretch, reference, kind) for stretch in interpolated(flown, until)
     )
-    return message.Message("AEM", _header(plan, created), segments)
+    return Message("AEM", _header(plan, created), segments)
 
 
 ALONE = (
@@ -229,7 +442,7 @@ ALONE = (
 
 def _segment(
     spacecraft: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str
-) -> message.Segment:
+) -> Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
     useable = (times[0], None, None, times[-1])  # all of it
     axes = BODY_FRAME if kind == QUATERNION_ANGVEL else None
@@ -242,24 +455,28 @@ def _segment(
         "UTC",
         *useable,
         kind,
+        None,
         axes,
         method,
         "3",
     ]
-    comments = [f"pulses completed: {stretch.completed}", *[ALONE] * (kind == SPIN)]
+    comments = [f"pulses completed: {stretch.completed}"]
     if kind == QUATERNION_ANGVEL:
         columns = np.column_stack([stretch.quaternion[:, [1, 2, 3, 0]], np.degrees(stretch.rates)])
     else:
         spin = spin_values(spacecraft.inertia, stretch.rates, stretch.quaternion)
         if kind == SPIN:
             spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
+            comments.append(ALONE)
+        else:
+            comments.append(euler_rate(spin, float(stretch.rates[0, 2])))
         columns = np.column_stack(
             [spin[keyword.name] for keyword in message.AEM_RECORDS[kind].keywords[1:]]
         )
     records = tuple(
-        (time, *map(message.number, row)) for time, row in zip(times, columns.tolist(), strict=True)
+        (time, *map(number, row)) for time, row in zip(times, columns.tolist(), strict=True)
     )
-    return message.Segment(
+    return Segment(
         block("", message.AEM_METADATA, values, *comments),
         records=records,
         record=message.AEM_RECORDS[kind],
@@ -274,7 +491,7 @@ PART = (
 KILO = 1e-3
 
 
-def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
+def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     """The message for a plan, made at ``created``; raises BadRequest where mass, forces or
     propellant are unknown.
     """
@@ -293,6 +510,199 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> message.Message:
         blocks.append(_block("STATE", [reference.epoch.text, *state]))
     blocks += [_block("SPACECRAFT", [spacecraft.mass]), *_manoeuvres("MANEUVER", plan, reference)]
     metadata = block("", message.OPM_METADATA, about, *(PART if orbit is None else ()))
-    return message.Message(
-        "OPM", _header(plan, created), (message.Segment(metadata, tuple(blocks)),)
+    return Message("OPM", _header(plan, created), (Segment(metadata, tuple(blocks)),))
+
+
+# --- spacecraft files from messages: new ones with a schedule, or others merged into
+
+ALIKE = 1e-9  # relative difference up to which torques count as transverse, and as of one magnitude
+
+_SOURCES = {
+    "inertia": ("INERTIA", "PHYS"),
+    "omega0": ("ANGVEL", "SPIN", "ATT"),
+    "steerable": ("MAN",),
+}
+"""Blocks of messages behind each part of the spacecraft file; the first there is one has it."""
+
+SAME_NUTATION, ROUNDED = 0.01, 1e-5
+"""Share of a nutation, and rad besides, by which that of the inertia may differ: messages round."""
+
+
+def imported(contents: Contents, path: str) -> tuple[str, Spacecraft, Schedule]:
+    """Text of the spacecraft file, the spacecraft, and the manoeuvres; FaultyFile, by lines of the
+    message.
+    """
+    record = contents.at()
+    (rates,), (quaternion,), tensor = record.rates, record.quaternions, contents.tensor
+    if tensor is None or np.isnan(rates).any():
+        name, absent = ("INERTIA", "moments of inertia") if tensor is None else ("ANGVEL", "rates")
+        cure = "--into merges the message into one that has them"
+        problem = f"missing; a spacecraft file needs {absent}: {cure}"
+        raise FaultyFile([Fault(path, 1, 1, name, problem)])
+    _, axes = principal_axes(tensor)
+    torques = [axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
+    sizes = [float(np.linalg.norm(torque)) for torque in torques]
+    transverse = all(
+        abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True)
     )
+    alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
+    unknown = "no thruster layout, " + ("no mass, " if contents.mass is None else "")
+    # Texts are in double quotes, in which JSON and YAML agree.
+    lines = [
+        f"# From the attitude message {printable(path)}; numbers as given there.",
+        f"# It knows {unknown}no requirement and no limits: add them.",
+        f"name: {json.dumps(contents.name, ensure_ascii=False)}",
+    ]
+    if contents.object_id is not None:
+        lines.append(f"object_id: {json.dumps(contents.object_id, ensure_ascii=False)}")
+    if contents.mass is not None:
+        lines.append(f"mass: {contents.mass!r} kg")
+    texts = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in rates.tolist())
+    lines += [*_inertia(tensor), f"omega0: [{texts}]"]
+    if not np.isnan(quaternion).any():
+        lines += [
+            "attitude:",
+            f"  epoch: {record.epoch.text.rstrip('0').rstrip('.')}Z",
+            f"  frame: {contents.frame}",
+            f"  quaternion: {quaternion.tolist()}   # body -> frame, scalar first",
+        ]
+    lines += _actuators(contents.manoeuvres, sizes[0] if alike else None)
+    text = "\n".join(lines) + "\n"
+    # Pulses of the steerable torquer; one that overlaps another has a name of its own.
+    pulses: list[Pulse] = []
+    free = 0.0
+    for place, (manoeuvre, torque) in enumerate(
+        zip(contents.manoeuvres, torques, strict=True), start=1
+    ):
+        start, lasts, used = manoeuvre.start, manoeuvre.duration, manoeuvre.mass
+        alone = start >= free - 1e-9
+        spent = None if used is None else -used
+        channel = STEERABLE if alone else f"MAN{place}"
+        pulses.append(
+            Pulse(start + 0.5 * lasts, lasts, channel, torque * lasts, torque, propellant=spent)
+        )
+        free = max(free, start + lasts) if alone else free
+    try:
+        return text, read_spacecraft(text, path), Schedule(tuple(pulses))
+    except FaultyFile as wrong:  # its faults are those of the message
+        faults = []
+        for fault in wrong.faults:
+            part = fault.where.partition(".")[0].partition("[")[0]
+            places = [name for name in _SOURCES.get(part, ()) if name in contents.lines]
+            where, line = (places[0], contents.lines[places[0]]) if places else (fault.where, 1)
+            faults.append(Fault(path, line, 1, where, fault.problem))
+        raise FaultyFile(faults) from None
+
+
+def contradictions(record: Contents, spacecraft: Spacecraft, remains: str) -> list[str]:
+    """Contradiction between the nutation that a record states and that by inertia and period, of
+    which one ``remains``.
+    """
+    stated, follows = abs(float(record.nutations[0])), spacecraft.widest.nutation
+    if math.isnan(stated) or abs(follows - stated) <= ROUNDED + SAME_NUTATION * stated:
+        return []
+    return [
+        f"SPIN says a nutation of {math.degrees(stated):.4g} deg, but with the moments of inertia "
+        f"NUTATION_PER gives one of {math.degrees(follows):.4g} deg; one of the three is wrong, "
+        f"and the file has {remains}"
+    ]
+
+
+def _inertia(tensor: Vector) -> list[str]:
+    first, second, third = np.diag(tensor).tolist()
+    if first == second and not (tensor - np.diag(np.diag(tensor))).any():
+        return [f"inertia: {{A: {first!r} kg m^2, C: {third!r} kg m^2}}"]
+    rows = (", ".join(f"{part!r} kg m^2" for part in row) for row in tensor.tolist())
+    return ["inertia:", "  tensor:", *(f"    - [{row}]" for row in rows)]
+
+
+def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list[str]:
+    if not manoeuvres:
+        return [
+            "# The message fires nothing; without thrusters an ideal steerable impulse is assumed."
+        ]
+    if torquer is not None:
+        first = round(manoeuvres[0].start, DIGITS)
+        return [
+            (
+                "# All manoeuvres of the message are transverse and of one torque, "
+                "as a steerable torquer gives them."
+            ),
+            f"steerable: {{torque: {torquer!r} N m}}",
+            *[f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"]
+            * bool(first),
+        ]
+    distinct = {tuple(manoeuvre.torque.tolist()): None for manoeuvre in manoeuvres}
+    return [
+        (
+            "# The torques that the message fires, as thrusters to begin with; without any, "
+            "an ideal steerable impulse is"
+        ),
+        "# assumed.",
+        "# thrusters:",
+        *(
+            (
+                f"#   - {{name: MAN{place}, torque: "
+                f"[{', '.join(f'{part!r} N m' for part in torque)}]}}"
+            )
+            for place, torque in enumerate(distinct, start=1)
+        ),
+    ]
+
+
+def merge(
+    source: Source, contents: Contents, time: float = 0.0, *, inertia: bool
+) -> tuple[str, tuple[str, ...], list[str]]:
+    """Text of a spacecraft file with the motion at the first record from ``time`` s on, and with
+    mass and ``inertia`` where asked for; remarks, and doubts.
+
+    Of SPIN with a nutation the spin and the angle stay, whatever C/A the file has. Raises
+    BadRequest where the message has not what is to be merged, or the file would be none.
+    """
+    if inertia and contents.tensor is None:
+        raise BadRequest("the message has no inertia to merge")
+    before = source.read(lambda _: None)
+    after, doubts, record = before, list[str](), contents
+    if inertia and contents.tensor is not None:
+        moments = Inertia(*principal_axes(contents.tensor), before.inertia.wheel)
+        after = replace(after, inertia=moments)
+    axes, quaternion = after.inertia.axes, before.initial.quaternion
+    rates, turn = before.rates, np.full(4, math.nan)
+    if len(contents.times) or not inertia:  # an ACM may have physical properties alone
+        record = contents.at(time, before.spin)
+        turn = record.quaternions[0]
+        rates = rates if np.isnan(record.rates).any() else record.rates[0]
+    after = replace(after, omega0=axes.T @ rates)
+    if record is not contents and record.nutations[0]:
+        stated = abs(float(record.nutations[0]))
+        doubts = contradictions(record, after, "its spin and nutation, not the period")
+        first, second, third = after.inertia.momentum(after.omega0).tolist()
+        share = abs(third) * math.tan(stated) / math.hypot(first, second)
+        if not math.isnan(share):
+            after = replace(after, omega0=after.omega0 * (share, share, 1.0))
+    turned = not np.isnan(turn).any()
+    if turned:
+        quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
+        own = None if before.attitude is None else before.attitude.frame
+        axes_of = AXES.get  # a file in J2000 stays so where the message says EME2000
+        frame = own if axes_of(own or "") == axes_of(contents.frame or "") else contents.frame
+        after = replace(after, attitude=Attitude(turn, epoch_after(record.epoch.text, 0.0), frame))
+    later = Later(before, after, quaternion)
+
+    def edits(tree: Node) -> Edits:
+        if inertia:
+            yield from inertia_edits(tree, later)
+        if inertia and contents.mass is not None:
+            yield Edit(("mass",), contents.mass, "mass")
+        if rates is not before.rates:
+            yield from rate_edits(tree, later)
+        if turned:
+            yield from attitude_edits(tree, later)
+
+    text = carry_text(*source[:3], edits)
+    try:
+        Source(text, source.name).read(lambda _: None)
+    except FaultyFile as wrong:
+        listed = "; ".join(f"{fault.where}: {fault.problem}" for fault in wrong.faults)
+        raise BadRequest(f"the message does not fit {source.name}: {listed}") from None
+    return text, record.remarks, doubts

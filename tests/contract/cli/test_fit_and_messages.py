@@ -17,7 +17,7 @@ from support.telemetry import Array, motion
 
 import nutdamp
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.read import read_apm
+from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.reader import example_text
 from nutdamp.flight.propagation import flown
 from nutdamp.physics.thruster import Trapezoid
@@ -517,7 +517,7 @@ def test_a_message_that_fires_nothing_gives_an_empty_schedule(run: Run, tmp_path
     assert "fires nothing" in exported(run, "import apm a.apm")
     assert len(exported(run, "import -q apm a.apm -o a.yaml --schedule -").splitlines()) == 1
     written(tmp_path, b_apm=(tmp_path / "a.apm").read_text().replace("= UTC", "= TAI"))
-    (said,) = read_apm(str(tmp_path / "b.apm")).remarks
+    (said,) = read_message(str(tmp_path / "b.apm")).remarks
     loud, quiet = (call(run, f"import apm b.apm -o b.yaml{more}").stderr for more in ("", " -q"))
     assert said in loud
     assert said not in quiet

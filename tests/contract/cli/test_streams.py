@@ -408,7 +408,7 @@ def test_where_such_names_are_shown_or_written_they_are_escaped_and_json_gives_t
     )
     message = run("import", "apm", f"{ODD}.apm")
     assert message.stdout.startswith(
-        r"# From the attitude parameter message d\udcfcse.apm; numbers as given there."
+        r"# From the attitude message d\udcfcse.apm; numbers as given there."
     )
     written(tmp_path, again_yaml=message.stdout)
     assert run("check", "again.yaml").returncode == 0

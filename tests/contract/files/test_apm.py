@@ -19,8 +19,8 @@ from support.golden import check_text
 from support.places import case
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.ccsds.message import MOST_BYTES
-from nutdamp.files.ccsds.read import ApmContents, contradictions, euler, imported, read_apm
+from nutdamp.files.ccsds.read import MOST_BYTES, Contents, euler, read_message
+from nutdamp.files.ccsds.write import contradictions, imported
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.files.schedules import read_pulses
 from nutdamp.flight import propagation
@@ -94,13 +94,13 @@ SPIN = (
 )
 """The example of annex F5.4."""
 
-Read = Callable[[str | bytes], ApmContents]
+Read = Callable[[str | bytes], Contents]
 
 
 @pytest.fixture
 def read(write: Write) -> Read:
     """``read(text)``: the contents of a message."""
-    return lambda text: read_apm(str(write(text, "a.apm")))
+    return lambda text: read_message(str(write(text, "a.apm")))
 
 
 def without(*blocks: str) -> str:
@@ -123,8 +123,8 @@ def test_everything_is_read(read: Read) -> None:
     apm = read(GOOD)
     assert (apm.name, apm.object_id, apm.frame) == ("SPINNER", "2026-031A", "EME2000")
     assert apm.epoch.text == "2026-03-01T12:00:00.500000000"
-    assert apm.quaternion == pytest.approx([0.8, 0.0, 0.6, 0.0])
-    assert apm.rates == pytest.approx(np.radians([8.0, 4.0, 180.0]))
+    assert apm.at().quaternions[0] == pytest.approx([0.8, 0.0, 0.6, 0.0])
+    assert apm.at().rates[0] == pytest.approx(np.radians([8.0, 4.0, 180.0]))
     assert present(apm.tensor).tolist() == [
         [120.0, -1.0, 2.0],
         [-1.0, 100.0, 0.0],
@@ -154,10 +154,11 @@ def test_everything_is_read(read: Read) -> None:
         read(without("QUAT").replace("EME2000", "ICRF")),
         read(GOOD.replace("EME2000", "ICRF")),
     )
-    assert (bare.quaternion, renamed.frame) == (None, "GCRF")
+    assert np.isnan(bare.quaternions).all()
+    assert renamed.frame == "GCRF"
     # A spin block that says something else.
     spun = read(before("INERTIA", SPIN))
-    assert spun.rates == pytest.approx(apm.rates)
+    assert spun.at().rates[0] == pytest.approx(apm.at().rates[0])
     check_text(
         "files.apm-remarks", "\n".join("\n".join(found.remarks) for found in (bare, renamed, spun))
     )
@@ -166,21 +167,23 @@ def test_everything_is_read(read: Read) -> None:
 def test_the_spin_of_the_standards_example(read: Read) -> None:
     """Annex F5.4 prints the quaternion and the axis of H to four digits."""
     apm = read(SPIN_ALONE)
-    assert apm.quaternion == pytest.approx([0.3812, 0.0805, 0.0334, 0.9204], abs=5e-5)
-    axes = attitude.matrix(present(apm.quaternion))
+    assert apm.at().quaternions[0] == pytest.approx([0.3812, 0.0805, 0.0334, 0.9204], abs=5e-5)
+    axes = attitude.matrix(present(apm.at().quaternions[0]))
     assert axes[:, 2] == pytest.approx([0.1736, 0.0, 0.9848], abs=5e-5)
     # 1 deg/s about the third axis and 0.01 deg/s about H make up the rates.
     expected = math.radians(1.0) * axes[:, 2] + math.radians(0.01) * np.array(
         [0.3420201, 0.0, 0.9396926]
     )
-    assert axes @ apm.rates == pytest.approx(expected, rel=1e-7)
+    assert axes @ apm.at().rates[0] == pytest.approx(expected, rel=1e-7)
     # The other form of the block says the same: H is 10 deg from the axis, and goes round in 36000
     # s.
     h = axes.T @ np.array([math.cos(math.radians(70.0)), 0.0, math.sin(math.radians(70.0))])
     phase = math.degrees(math.atan2(-h[1], h[0]))
     other = f"NUTATION = 10\nNUTATION_PER = 36000\nNUTATION_PHASE = {phase}\n"
-    assert read(edited(MOMENTUM, other, SPIN_ALONE)).rates == pytest.approx(apm.rates, rel=1e-12)
-    assert read(edited(MOMENTUM, "", SPIN_ALONE)).rates == pytest.approx(
+    assert read(edited(MOMENTUM, other, SPIN_ALONE)).at().rates[0] == pytest.approx(
+        apm.at().rates[0], rel=1e-12
+    )
+    assert read(edited(MOMENTUM, "", SPIN_ALONE)).at().rates[0] == pytest.approx(
         [0.0, 0.0, math.radians(1.0)], abs=1e-15
     )
 
@@ -197,9 +200,9 @@ def test_frames_the_other_way_round_and_rates_in_the_inertial_frame(read: Read) 
     for axis, rate, seen in zip("XYZ", (8, 4, 180), rates.tolist(), strict=True):
         turned = edited(f"ANGVEL_{axis} = {rate} ", f"ANGVEL_{axis} = -{rate} ", turned)
         inertial = edited(f"ANGVEL_{axis} = {rate} ", f"ANGVEL_{axis} = {seen!r} ", inertial)
-    assert read(turned).quaternion == pytest.approx([0.8, 0.0, 0.6, 0.0])
+    assert read(turned).at().quaternions[0] == pytest.approx([0.8, 0.0, 0.6, 0.0])
     for text in (turned, inertial):
-        assert read(text).rates == pytest.approx(np.radians([8.0, 4.0, 180.0]), rel=1e-14)
+        assert read(text).at().rates[0] == pytest.approx(np.radians([8.0, 4.0, 180.0]), rel=1e-14)
 
 
 def test_euler_angles(read: Read) -> None:
@@ -216,7 +219,7 @@ def test_euler_angles(read: Read) -> None:
     about_z = np.array(
         [[math.cos(three), math.sin(three), 0], [-math.sin(three), math.cos(three), 0], [0, 0, 1]]
     )
-    turned = attitude.matrix(present(apm.quaternion)).T
+    turned = attitude.matrix(present(apm.at().quaternions[0])).T
     assert turned == pytest.approx(about_z @ about_y @ about_x, abs=1e-15)
     assert euler("ZXZ", 0.0, 0.0, 0.0).tolist() == [1.0, 0.0, 0.0, 0.0]
 
@@ -234,17 +237,12 @@ def test_faults(read: Read) -> None:
             ("OBJECT_ID = 2026-031A\n", ""),
             ("OBJECT_ID = 2026-031A", "OBJECT_IDENT = 2026-031A"),
             ("ORIGINATOR = TEST", "ORIGINATOR = TEST\nORIGINATOR = TEST"),
-            (
-                "ORIGINATOR = TEST\nOBJECT_NAME = SPINNER",
-                "OBJECT_NAME = SPINNER\nORIGINATOR = TEST",
-            ),
             ("EPOCH = 2026", "META_START\nMETA_STOP\nEPOCH = 2026"),
             ("Q2 = 0.6\n", ""),
             *(
                 ("Q2 = 0.6", f"Q2 = {value}")
                 for value in ("0.7", "0,6", "nan", "1e999", "0.6 [deg]")
             ),
-            ("Q1 = 0.0\nQ2 = 0.6", "Q2 = 0.6\nQ1 = 0.0"),
             *((f"{ENDS}Q1", f"{ENDS}Q1".replace("EME2000", frame)) for frame in ("TOD", "GCRF")),
             *(
                 (f"{ENDS}Q1", f"{ENDS}Q1".replace("SC_BODY_1", frame))
@@ -262,13 +260,7 @@ def test_faults(read: Read) -> None:
             *(("MAN_DURATION = 0.5 [s]", f"MAN_DURATION = {value} [s]") for value in (-0.5, 0)),
             ("MAN_DELTA_MASS = -0.01", "MAN_DELTA_MASS = 0.01"),
             ("MAN_TOR_X = 6", "MAN_TOR_X = 0"),
-            *(
-                (
-                    "MAN_EPOCH_START = 2026-03-01T12:00:02",
-                    f"MAN_EPOCH_START = 2026-03-01T12:00:0{s}",
-                )
-                for s in (0, 5)
-            ),
+            ("MAN_EPOCH_START = 2026-03-01T12:00:02", "MAN_EPOCH_START = 2026-03-01T12:00:00"),
             ("COMMENT first", "torque about axis 1"),
             ("MAN_DELTA_MASS = -0.01 [kg]", "MAN_DELTA_VEL = 1"),
         ),
@@ -278,7 +270,6 @@ def test_faults(read: Read) -> None:
     blocks = {
         "no ANGVEL": without("ANGVEL"),
         "two of ANGVEL": before("INERTIA", angvel),
-        "ANGVEL first": before("QUAT", angvel, without("ANGVEL")),
         "several faults at once": edited("Q2 = 0.6", "Q2 = x", several),
     }
     check_faults("files.apm-blocks", read, blocks)
@@ -308,7 +299,7 @@ def test_what_is_no_such_message(read: Read) -> None:
     for encoding in ("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"):
         for text in XML:
             assert faults(read, text.encode(encoding)) == faults(read, XML[0])
-    assert faults(read_apm, str(case("crash-xml-encoding.apm.txt"))) == faults(read, XML[0])
+    assert faults(read_message, str(case("crash-xml-encoding.apm.txt"))) == faults(read, XML[0])
     latin = "CCSDS_APM_VERS = 2.0\nORIGINATOR = MÜLLER\n".encode("latin-1")
     wrong = {"zeros": b"\xff\xfe\x00", "UTF-16": GOOD[:21].encode("utf-16"), "Latin-1": latin}
     check_faults("files.apm-encodings", read, wrong)
@@ -316,9 +307,9 @@ def test_what_is_no_such_message(read: Read) -> None:
         with Path("huge.apm").open("wb") as stream:
             stream.write(start.encode())
             stream.truncate(MOST_BYTES + 1)
-        assert faults(read_apm, "huge.apm") == ["0:0: : too large: more than 16 MiB"]
+        assert faults(read_message, "huge.apm") == ["0:0: : too large: more than 16 MiB"]
     with pytest.raises(CannotRead):
-        read_apm("missing.apm")
+        read_message("missing.apm")
 
 
 @pytest.mark.deep
@@ -349,7 +340,7 @@ PLANNED_ALIKE = 1e-6
 that differ in the last digit.
 """
 
-Taken = tuple[ApmContents, str, Spacecraft, Schedule]
+Taken = tuple[Contents, str, Spacecraft, Schedule]
 Take = Callable[[str | planning.Plan], Taken]
 
 
@@ -360,7 +351,7 @@ def take(write: Write) -> Take:
     """
 
     def take(message: str | planning.Plan) -> Taken:
-        contents = read_apm(
+        contents = read_message(
             str(
                 write(message if isinstance(message, str) else export_text(message, "apm"), "a.apm")
             )
@@ -376,10 +367,10 @@ def test_state_inertia_and_manoeuvres_come_back(case: str, take: Take) -> None:
     body = plan.spacecraft
     apm, text, back, schedule = take(plan)
     assert apm.remarks == ()
-    assert apm.rates == pytest.approx(
+    assert apm.at().rates[0] == pytest.approx(
         messages.in_file_axes(body, body.initial.rates), rel=1e-13, abs=1e-15
     )
-    axes = attitude.matrix(present(apm.quaternion))
+    axes = attitude.matrix(present(apm.at().quaternions[0]))
     assert axes == pytest.approx(messages.columns(body, body.initial.quaternion), abs=1e-14)
     assert apm.tensor == pytest.approx(body.inertia.tensor, rel=1e-15)
     assert back.omega0 == pytest.approx(body.omega0, rel=1e-12, abs=1e-15)
@@ -506,7 +497,9 @@ def test_times_of_another_system_become_utc_and_a_nutation_that_contradicts_is_s
         apm, _, body, pulses = take(text.replace("= UTC", f"= {system}"))
         moments.append(apm.epoch)
         assert [pulse.start for pulse in pulses] == [3600.0]
-        (said,) = contradictions(apm, body)
+        (said,) = contradictions(apm, body, "the latter nutation")
         check_text("files.nutation-contradicts", said)
-        assert contradictions(apm._replace(nutation=body.widest.nutation), body) == []
+        assert (
+            contradictions(apm._replace(nutations=np.array([body.widest.nutation])), body, "") == []
+        )
     assert [moments[0].since(moment) for moment in moments[1:]] == [37.0, 37.0 + 32.184]

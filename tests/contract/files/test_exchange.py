@@ -24,7 +24,8 @@ from support.golden import check_text, refusal
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.message import APM_BLOCKS, comment, label, number
+from nutdamp.files.ccsds.message import APM_BLOCKS
+from nutdamp.files.ccsds.write import comment, label, number
 from nutdamp.files.export import TURN, interpolated
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation

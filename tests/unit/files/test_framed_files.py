@@ -11,7 +11,8 @@ from support.builders import present
 
 import nutdamp
 from nutdamp.common.time import Epoch
-from nutdamp.files.ccsds.read import merged_text, read_apm, read_history
+from nutdamp.files.ccsds.read import read_message
+from nutdamp.files.ccsds.write import merge
 from nutdamp.files.reader import Source, source_of
 from nutdamp.files.telemetry import record_of
 from nutdamp.physics import attitude
@@ -131,7 +132,7 @@ def test_what_is_carried_on_and_merged_stays_in_the_frame(tmp_path: Path) -> Non
     plan = planned("ECLIPDATE")
     source = source_of(mission("ECLIPDATE"))
     nutdamp.export(planned("J2000"), "apm", tmp_path / "a.apm")
-    merged = merged_text(source, read_apm(str(tmp_path / "a.apm")), inertia=False)
+    merged, _, _ = merge(source, read_message(str(tmp_path / "a.apm")), inertia=False)
     after = Source(merged, "f.yaml").read()
     assert present(after.attitude).frame == "ECLIPDATE"
     bodies = (plan.spacecraft.initial, after.initial)
@@ -143,6 +144,6 @@ def test_what_is_carried_on_and_merged_stays_in_the_frame(tmp_path: Path) -> Non
 def test_a_history_of_eme2000_is_telemetry_in_the_frame_of_the_file(tmp_path: Path) -> None:
     plan = planned("ECLIPDATE")
     nutdamp.export(plan, "aem", tmp_path / "a.aem", until=20.0)
-    record = record_of(read_history(str(tmp_path / "a.aem")), plan.spacecraft, Schedule())
+    record = record_of(read_message(str(tmp_path / "a.aem")), plan.spacecraft, Schedule())
     axis = np.array([record.signals[f"axis_{name}"][0] for name in "xyz"])
     assert attitude.angle_between(axis, plan.spacecraft.axis) < SOLID
