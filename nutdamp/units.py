@@ -57,12 +57,20 @@ POUND, FOOT, STANDARD_GRAVITY = 0.45359237, 0.3048, 9.80665
 POUND_FORCE = POUND * STANDARD_GRAVITY
 """N."""
 
+ANGLES = {
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": math.pi / 180.0,
+    "arcmin": math.pi / 10800.0,
+    "arcsec": math.pi / 648000.0,
+}
+
 KINDS: dict[str, Kind] = {
     "mass": Kind("a mass", {"kg": 1.0, "g": 1e-3, "lbm": POUND, "slug": POUND_FORCE / FOOT}),
     "length": Kind(
         "a length", {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": FOOT, "in": FOOT / 12.0}
     ),
-    "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "hours": 3600.0}),
+    "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "days": 86400.0}),
     "force": Kind("a force", {"N": 1.0, "mN": 1e-3, "lbf": POUND_FORCE}),
     "torque": Kind(
         "a torque",
@@ -88,7 +96,8 @@ KINDS: dict[str, Kind] = {
     ),
     "shed": Kind("a moment of inertia for each kg", {"kg m^2/kg": 1.0, "m^2": 1.0}),
     "travel": Kind("a length for each kg", {"m/kg": 1.0, "mm/kg": 1e-3}),
-    "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
+    "angle": Kind("an angle", ANGLES),
+    "right ascension": Kind("a right ascension", {**ANGLES, "h": math.pi / 12.0}),
     "rate": Kind(
         "an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}
     ),
@@ -102,7 +111,12 @@ KINDS: dict[str, Kind] = {
     "ratio": Kind("a ratio", {"%": 0.01}),
     "number": Kind("a plain number", {}),
 }
-"""The kinds of quantity by name; ``number`` has no unit, such as the parts of a quaternion."""
+"""The kinds of quantity by name; ``number`` has no unit, such as the parts of a quaternion. In a
+right ascension h is an angle, and `HOURS` are read too.
+"""
+
+HOURS = r"([01]?[0-9]|2[0-3])\s*h\s*([0-5]?[0-9])\s*m\s*(([0-5]?[0-9](\.[0-9]*)?)\s*s)?"
+"""Regular expression (ECMA 262 and Python) of a right ascension such as 18h 12m 33s."""
 
 LARGEST = 1e15
 """Largest magnitude in SI: nothing physical is larger,
@@ -118,9 +132,16 @@ LARGEST_SEED = 2**64 - 1
 _QUANTITY = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL
 )
+_DECIMAL_COMMA = re.compile(r"[^,.]*[0-9],[0-9][^,.]*")
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
-_WORDS = {"deg": "(deg(rees?)?|°)", "s": "s(ec)?", "hours": "hours?", "rpm": "[rR][pP][mM]"}
+_WORDS = {
+    "deg": "(deg(rees?)?|°)",
+    "s": "s(ec)?",
+    "h": "h(ours?)?",
+    "days": "d(ays?)?",
+    "rpm": "[rR][pP][mM]",
+}
 """Regular expressions of words within units that are spelt in several ways."""
 
 
@@ -169,12 +190,17 @@ def parse(value: object, kind: str, *, bare: bool = False) -> float:
 def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
     """Number and factor of a text with a unit of ``kind``."""
     expected = KINDS[kind]
+    if _DECIMAL_COMMA.fullmatch(text):
+        point = shown(text.replace(",", "."))
+        raise ValueError(f"{shown(text)} has a decimal comma; write {point}, with a decimal point")
+    hours = re.fullmatch(HOURS, text.strip()) if kind == "right ascension" else None
+    if hours is not None:
+        minutes = float(hours[2]) + float(hours[4] or 0.0) / 60.0
+        return float(hours[1]) + minutes / 60.0, expected.factors["h"]
     match = _QUANTITY.fullmatch(text)
-    # A "unit" that starts like the rest of a number is a decimal comma or a thousands separator.
+    # A "unit" that starts like the rest of a number has a thousands separator before it.
     if match is None or re.match(r"[0-9.,_']", match[2]):
-        comma = re.match(r"\s*[-+]?[0-9]+,[0-9]+\s*($|[^0-9.,\s])", text)
-        point = f"; write {shown(text.replace(',', '.', 1))}, with a decimal point" if comma else ""
-        raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}{point}")
+        raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     number = float(match[1])
     unit = re.sub(r"\s+", " ", match[2])
     if not unit and bare:
@@ -185,22 +211,20 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         raise ValueError(
             f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out"
         )
-    named_unit = next(
-        ((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None
-    )
-    if named_unit is None or (named_unit[0] == "frequency" and kind != "frequency"):
+    meanings = {name: factor for spelling, name, factor in _UNITS if spelling.fullmatch(unit)}
+    if kind in meanings:
+        return number, meanings[kind]
+    if not meanings or "frequency" in meanings:
         noun = expected.noun.partition(" ")[2]
-        turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
+        turns = kind in ("rate", "angle", "right ascension") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
         raise ValueError(
             f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {expected.units}{hint}"
         )
-    if named_unit[0] != kind:
-        raise ValueError(
-            f"{shown(text)} is {KINDS[named_unit[0]].noun}; expected {expected.noun}: "
-            f"{expected.expected}"
-        )
-    return number, named_unit[1]
+    other = KINDS[next(iter(meanings))]
+    raise ValueError(
+        f"{shown(text)} is {other.noun}; expected {expected.noun}: {expected.expected}"
+    )
 
 
 def pattern(kind: str) -> str:
@@ -208,7 +232,10 @@ def pattern(kind: str) -> str:
     JSON Schema.
     """
     units = "|".join(map(_spellings, KINDS[kind].factors))
-    return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({units})\s*$"
+    quantity = rf"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({units})"
+    if kind == "right ascension":
+        quantity = f"({quantity}|{HOURS})"
+    return rf"^\s*{quantity}\s*$"
 
 
 SI, US = "si", "us"

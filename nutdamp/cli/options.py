@@ -120,12 +120,17 @@ class Angles(NamedTuple):
 
 
 class Direction(click.ParamType):  # type: ignore[type-arg]
-    """Two angles with a comma between them, of which a ``check`` holds."""
+    """Two angles with a comma between them, the first of a ``kind``, of which a ``check`` holds."""
 
     name = "angle,angle"
 
-    def __init__(self, check: Callable[[list[Angles]], object] = len, problem: str = "") -> None:
-        self.check, self.problem = check, problem
+    def __init__(
+        self,
+        check: Callable[[list[Angles]], object] = len,
+        problem: str = "",
+        kind: str = "angle",
+    ) -> None:
+        self.check, self.problem, self.kinds = check, problem, (kind, "angle")
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -135,8 +140,12 @@ class Direction(click.ParamType):  # type: ignore[type-arg]
             return value
         parts = [part.strip() for part in str(value).split(",")]
         if len(parts) != 2:
-            self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
-        first, second = (UnitType("angle").convert(part, param, ctx) for part in parts)
+            point = "; decimals take a point" if len(parts) > 2 else ""
+            self.fail(f"{value!r} is not two angles, such as 10deg,45deg{point}", param, ctx)
+        first, second = (
+            UnitType(kind).convert(part, param, ctx)
+            for kind, part in zip(self.kinds, parts, strict=True)
+        )
         try:
             self.check([Angles(first, second)])
         except BadRequest:
@@ -181,7 +190,9 @@ class Grouped(click.Option):
 def goal_options(command: Command, *, several: bool = True) -> Command:
     """The goal, and the options of every scheme; with ``several`` one with a bug is passed over."""
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
-    angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
+    angles = functools.partial(
+        option, type=Direction(kind="right ascension"), metavar="ANGLE,ANGLE"
+    )
     command = debug_option(command) if several else command
     disturbed = "Plan on the motion with the disturbances of the file."
     command = option("--with-disturbances", is_flag=True, help=disturbed)(command)

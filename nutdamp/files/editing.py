@@ -14,6 +14,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from numbers import Integral, Real
 from typing import NamedTuple
@@ -483,7 +484,10 @@ def as_before(node: Node | None, value: float, kind: str) -> str:
     if before is not None and not isinstance(before, str):
         return number(value)
     suffix = re.search(r"[^\d.eE+\s-].*$", (before or "").strip())
-    unit = suffix.group() if suffix else "deg" if kind == "angle" else KINDS[kind].si
+    unit = "deg" if kind == "angle" else KINDS[kind].si
+    if suffix is not None:
+        with suppress(ValueError):  # hours, minutes and seconds are no unit
+            return f"{number(value / parse(f'1 {suffix.group()}', kind))} {suffix.group()}"
     return f"{number(value / parse(f'1 {unit}', kind))} {unit}"
 
 

@@ -14,6 +14,7 @@ import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from types import NoneType, UnionType
 from typing import (
     Annotated,
@@ -92,7 +93,8 @@ class Length(Rule):
         if long or len(entries) < self.least:
             count = f"{self.least} to {self.most}" if self.most != self.least else f"{self.least}"
             count = f"at least {self.least}" if self.most is None else count
-            raise ValueError(f"expected {count} entries, got {len(entries)}")
+            comma = decimal_comma(value) if long else ""
+            raise ValueError(f"expected {count} entries, got {len(entries)}{comma}")
         return entries
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -104,6 +106,16 @@ class Length(Rule):
             f"min{of}": self.least,
             **({} if self.most is None else {f"max{of}": self.most}),
         }
+
+
+def decimal_comma(entries: list[Any]) -> str:
+    """Words for a list with too many entries, a number of which is parted by a decimal comma:
+    [0,5 deg, 1 deg].
+    """
+    for whole, rest in pairwise(entries):
+        if type(whole) is int and isinstance(rest, str) and rest[:1].isdigit():
+            return f"; '{whole},{rest}' has a decimal comma; write {whole}.{rest}"
+    return ""
 
 
 class Within(Rule):
@@ -240,7 +252,8 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
         ]
     if plain is tuple:
         if len(parts) != len(value):
-            problems.append((path, f"expected {len(parts)} entries, got {len(value)}"))
+            comma = decimal_comma(value) if len(value) > len(parts) else ""
+            problems.append((path, f"expected {len(parts)} entries, got {len(value)}{comma}"))
             return None
         return [
             _read(parts[index], entry, problems, (*path, index))

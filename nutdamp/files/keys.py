@@ -524,7 +524,8 @@ Torques = Annotated[list[Annotated[float, Quantity("torque")]], THREE]
 DisturbingTorques = Annotated[Torques, _AxialShorthand()]
 Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], THREE]], THREE]
 Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Length(4, 4)]
-InTheSky = tuple[Angle, Declination]
+RightAscension = Annotated[float, Quantity("right ascension")]
+InTheSky = tuple[RightAscension, Declination]
 Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
 Window = Annotated[list[Time], Length(2, 2)]
 DateAndTime = Annotated[str, _DateAndTime()]
@@ -882,7 +883,7 @@ class GoalSection(Section):
         "leans at t = 0.",
         "45 deg",
     )
-    right_ascension: Angle | None = Field(
+    right_ascension: RightAscension | None = Field(
         "Right ascension of the target axis in the attitude's frame, rad.", "83.6 deg"
     )
     declination: Declination | None = Field(

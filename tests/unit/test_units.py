@@ -33,7 +33,8 @@ UNITS = {
         "2 min": 120.0,
         "2 hours": 7200.0,
         "3 sec": 3.0,
-        "1 hour": 3600.0,
+        **dict.fromkeys(("1 hour", "1h", "1 hours"), 3600.0),
+        **dict.fromkeys(("2 days", "2d", "2 day"), 172800.0),
     },
     "force": {"10 N": 10.0, "10 mN": 0.01, "5 lbf": 22.241108076303},
     "torque": {
@@ -57,7 +58,19 @@ UNITS = {
         "0.5 rad": 0.5,
         "5 mrad": 0.005,
         "90 deg": math.pi / 2,
+        "60 arcmin": math.pi / 180,
+        "3600 arcsec": math.pi / 180,
         **dict.fromkeys(("180 deg", "180 degrees", "180 degree", "180°", "180 °"), math.pi),
+    },
+    "right ascension": {
+        "0.5 rad": 0.5,
+        "5 mrad": 0.005,
+        "60 arcmin": math.pi / 180,
+        "3600 arcsec": math.pi / 180,
+        "180 deg": math.pi,
+        **dict.fromkeys(("18 h", "18h 0m", "18h00m00.0s"), 1.5 * math.pi),
+        "18h 12m 33s": math.radians(273.1375),
+        " 0 h 0 m 0.5 s ": math.radians(0.5 / 240.0),
     },
     "rate": {
         **dict.fromkeys(("3 rad/s", "3 rad/sec"), 3.0),
@@ -110,6 +123,14 @@ def test_refusals_say_what_is_allowed() -> None:
                 *[
                     ("120 kg", "inertia"),
                     ("5 rpm", "angle"),
+                    ("18h 12m 33s", "angle"),
+                    ("18 h", "angle"),
+                    ("18h 72m 33s", "right ascension"),
+                    ("18h 12m 33,5s", "right ascension"),
+                    ("5 s", "right ascension"),
+                    ("-0,5 deg", "angle"),
+                    ("0,5", "angle"),
+                    ("1,234.5 kg", "mass"),
                     ("5 deg", "ratio"),
                     ("1 m", "number"),
                     ("1", "number"),
@@ -143,7 +164,7 @@ def test_refusals_say_what_is_allowed() -> None:
             ]
         ),
     )
-    for unit in ("Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmin"):
+    for unit in ("Deg", "dg", "secs", "Sec", "hrs", "rp m", "deg°", "M", "KM", "msec", "arcmins"):
         for kind in KINDS:
             with pytest.raises(ValueError, match="is not a"):
                 parse(f"5 {unit}", kind)

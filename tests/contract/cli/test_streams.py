@@ -475,6 +475,8 @@ USAGE = {
         "plan --target 10,45",
         "plan --scheme rhumb-line --target 40deg,0deg --sun 190deg,0deg",
         "report --target 10deg",
+        "plan --target 10,5deg,45deg",
+        "plan --spin 0,5rpm",
     ],
     "settings": ["plan --set mass"],
     "endings": [

@@ -147,3 +147,13 @@ def test_a_history_of_eme2000_is_telemetry_in_the_frame_of_the_file(tmp_path: Pa
     record = record_of(read_message(str(tmp_path / "a.aem")), plan.spacecraft, Schedule())
     axis = np.array([record.signals[f"axis_{name}"][0] for name in "xyz"])
     assert attitude.angle_between(axis, plan.spacecraft.axis) < SOLID
+
+
+def test_right_ascension_in_hours() -> None:
+    keys = mission("J2000")
+    plain = nutdamp.load(keys)
+    keys["goal"]["right_ascension"] = "3h 0m 0.0s"
+    keys["keep"][0]["direction"][0] = "5.3333333333333333 h"
+    spoken = nutdamp.load(keys)
+    assert present(spoken.goal.axis) == pytest.approx(present(plain.goal.axis), abs=1e-15)
+    assert present(spoken.keep[0].direction) == pytest.approx(present(plain.keep[0].direction))
