@@ -436,7 +436,7 @@ def workbench_of(flown: Flight, craft: str) -> Workbench:
     rows = [
         (
             part.value,
-            requirements.BOUNDS.get(part, part.label),
+            requirements.POINTING if part is Part.DISTANCE else part.label,
             f"≤ {limit_text(limits[part]).removesuffix(' deg')}°" if part in limits else "",
         )
         for part in parts

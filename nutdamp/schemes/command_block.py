@@ -97,7 +97,7 @@ def too_coarse(
             yield note(
                 "finer-delay-step",
                 delay_step_s=commands.delay_step,
-                part=part.label,
+                part=requirements.POINTING if part is Part.DISTANCE else part.label,
                 change_deg=change,
             )
     if along > min(missed.values(), default=math.inf):

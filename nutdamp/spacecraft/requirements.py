@@ -45,7 +45,7 @@ class Part(Enum):
         return LABELS.get(self, self.value.replace("_", " "))
 
 
-BOUNDS = {Part.DISTANCE: "pointing"}  # names of bounds that are not those of their parts
+POINTING = "pointing error"  # what requirement.pointing bounds, in texts; of no bound, axis error
 LABELS = {Part.SPIN: "spin error", Part.DURING: "nutation on the way"}
 
 
@@ -67,8 +67,13 @@ class Bound(NamedTuple):
     def label(self) -> str:
         """Name in texts."""
         named = self.part is Part.CONE and self.keep is not None
-        label = BOUNDS.get(self.part, self.part.label)
+        label = POINTING if self.part is Part.DISTANCE else self.part.label
         return f"axis from {self.keep.name}" if named and self.keep else label
+
+    @property
+    def key(self) -> str:
+        """Name in files: that of its key where that bounds the part alone."""
+        return "pointing" if self.part is Part.DISTANCE else self.part.value
 
     def met(self, value: Any) -> Any:
         """True where a value keeps the bound: numbers, or arrays over cases."""

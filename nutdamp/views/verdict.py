@@ -19,7 +19,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import Cases, Light, Line, Status, Verdict
 from nutdamp.schemes.catalogue import SCHEMES
 from nutdamp.spacecraft.model import required_share
-from nutdamp.spacecraft.requirements import BOUNDS, Bound, Part
+from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, values_of
 from nutdamp.views.text import (
@@ -316,8 +316,7 @@ def scheme_word(compared: Comparison, plan: Plan) -> str:
 def line_json(line: Line) -> dict[str, Any]:
     """A bound: its limit, values, share of the cases that keep it alone, and margin."""
     bound = line.bound
-    part = BOUNDS.get(bound.part, bound.part.value)
-    named = {"part": part, "required": bound.required}
+    named = {"part": bound.key, "required": bound.required}
     if bound.part is Part.CONE and bound.keep is not None:
         named |= {"name": bound.keep.name, "edge": "min" if bound.inner else "max"}
     unit, scale = ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", math.degrees(1.0))

@@ -43,6 +43,7 @@ import nutdamp
 from nutdamp.common import work
 from nutdamp.common.results import Note
 from nutdamp.errors import BadRequest
+from nutdamp.files.reader import example_text
 from nutdamp.files.tabular import json_text
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import by_impulses
@@ -54,6 +55,7 @@ from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons, verdict_notes
 from nutdamp.planning.verdict import Cases, Light, Status, cases_of
 from nutdamp.schemes import catalogue
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import (
     Disturbance,
@@ -68,6 +70,7 @@ from nutdamp.spacecraft.requirements import SAME_COST, Part, bounds
 from nutdamp.spacecraft.schedule import Bounds, Pulse, Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions
 from nutdamp.views.decisions import certificate_json
+from nutdamp.views.verdict import line_json
 
 EXITS = {
     Status.FLY: 0,
@@ -672,6 +675,29 @@ def noted_beside(
     return list(
         verdict_notes(planning.judge(made, cases, nominal=cases is None), made, looped=looped)
     )
+
+
+@pytest.mark.parametrize(
+    ("key", "tilt", "part", "said"),
+    [
+        ("pointing", 10.0, "pointing", False),
+        ("momentum_shift", 10.0, "pointing", True),
+        ("momentum_shift", None, "momentum_shift", False),
+    ],
+)
+def test_where_h_may_end_counts_from_the_target_or_from_t_0(
+    key: str, tilt: float | None, part: str, said: bool
+) -> None:
+    """With a target momentum_shift is read as pointing, and a warning says so."""
+    text = example_text().replace("momentum_shift: 0.2 deg", f"{key}: 0.2 deg", 1)
+    body = nutdamp.read(text if tilt is None else f"{text}goal: {{tilt: {tilt} deg}}\n")
+    made = planning.plan(body, "none")
+    (bound,) = (each for each in requirements.required(body) if each.part is not Part.NUTATION)
+    assert (bound.part is Part.DISTANCE, bound.limit) == (tilt is not None, math.radians(0.2))
+    (line,) = (each for each in planning.judge(made, nominal=True).lines if each.bound == bound)
+    assert line.nominal == pytest.approx(math.radians(tilt or 0.0), abs=1e-9)
+    assert line_json(line)["part"] == part
+    assert ("momentum-shift-of-target" in codes(noted_beside(made))) == said
 
 
 def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> None:
