@@ -329,6 +329,7 @@ def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(
             HEAD + "T1,1,1,0.1,100000\n",
             COUNTS + "T1,3,-4,0,4\nT1,9,2.5,3,4\n",
             "channel,delay\nT1,1\n",
+            HEAD + "T1,4,1,0.1,10\nT1,8,1.06,0.1,2\nT1,1,0.95,0.1,5\n",
         ),
     )
     assert [block.count for block in blocks(HEAD + "T1,1,1,0.1,5000\n")[0]] == [5000]
@@ -337,6 +338,9 @@ def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(
         "files.blocks-warned",
         "\n".join(blocks(every + "T1,3,4.899,0.153,4,3\nT1,20,1.001,0.1,300,1\n")[1]),
     )
+    by_angle = replace(CRAFT, commands=replace(present(CRAFT.commands), delay_is="angle"))
+    interleaved = HEAD + "T1,3,1,0.1,9\nT1,4,2,0.1,4\nT1,5,3,0.1,4\n"
+    check_text("files.blocks-interleaved", "\n".join(blocks(interleaved, by_angle)[1]))
 
 
 def test_a_single_flight_has_no_jitter_of_the_sun_pulses(run: Run, blocks: ReadBlocks) -> None:
