@@ -158,6 +158,11 @@ def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: in
 
 THEMIS = load(places.case("two-pulses-a-turn.yaml"))
 TWO_A_TURN, _ = read_blocks(places.case("two-pulses-a-turn.csv"), THEMIS)
+IN_STEP = replace(
+    THEMIS,
+    commands=replace(present(THEMIS.commands), per_turn=2, delay_is="angle"),
+    goal=Goal(spin=20.0 * math.pi / 30.0),
+)
 
 
 def test_two_blocks_a_turn_stay_opposite_as_the_reference_has_it() -> None:
@@ -199,6 +204,29 @@ def test_pulses_that_would_overlap_are_refused_by_block_and_sun_pulse(
 ) -> None:
     with pytest.raises(Infeasible, match=f"{text}.*give them delays or Sun pulses farther apart"):
         fired(THEMIS, (TWO_A_TURN[0], replace(TWO_A_TURN[1], angle=angle)))
+
+
+def test_opposite_blocks_set_the_spin_where_sequences_turn_h_too_far() -> None:
+    """Two blocks, of as many pulses as leave no nutation."""
+    plan = planned(IN_STEP)
+    before, after = plan.pulses.blocks
+    assert math.degrees(after.angle - before.angle) == pytest.approx(180.0, abs=0.05)
+    assert replace(after, angle=before.angle) == before
+    assert plan.pulses.cost < 1.01 * fired(THEMIS, TWO_A_TURN).cost
+    assert codes(plan.pulses.notes) == ["blocks-opposite"]
+    alone = replace(IN_STEP, commands=THEMIS.commands)
+    assert not planned(alone, met=False).meets_requirement
+    assert "--per-turn 1 or 2" in str(
+        infeasibility(planning.plan(IN_STEP, "command-block", Options(per_turn=3)))
+    )
+
+
+def test_a_further_block_damps_what_opposite_ones_leave() -> None:
+    """With the one width of the flown ones, which leave 0.56 deg of nutation."""
+    commands = replace(present(IN_STEP.commands), widths=np.array([0.357]), width_step=None)
+    plan = planned(replace(IN_STEP, commands=commands))
+    assert plan.pulses.blocks[:2] == TWO_A_TURN
+    assert len(plan.pulses.blocks) > 2
 
 
 @pytest.mark.parametrize("seed", [26, 52])
