@@ -98,15 +98,16 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     from nutdamp.views.text import joined
 
     scheme, schedule, blocks = job.flown
-    if schedule is not None:
+    path = schedule if blocks is None else blocks
+    if path is not None:
         from nutdamp.files.schedules import read_plan
 
-        expect_read((), job.options, job.spacecraft, job.doubt)
-        plan, warnings = read_plan(schedule, job.spacecraft, job.options.of(SchemeOptions))
+        if schedule is not None:
+            expect_read((), job.options, job.spacecraft, job.doubt)
+        plain = job.options.of(SchemeOptions)
+        plan, warnings = read_plan(path, job.spacecraft, plain, blocks=blocks is not None or None)
         job.doubt(*warnings)
         return plan
-    if blocks is not None:
-        return _fired(job, blocks)
     if scheme is None:
         compared = compared_with(job, ())
         recommended = compared.recommended
@@ -125,22 +126,6 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
     job.note(plan_notes(plan, cones=scheme is not None and not judged))
     return plan
-
-
-def _fired(job: Job, path: str) -> Plan:
-    """The pulses that a file of command blocks fires, as a plan; Infeasible without Sun pulses."""
-    from nutdamp.files.schedules import read_blocks
-    from nutdamp.planning.causes import broken_limits
-    from nutdamp.planning.plan import Plan
-    from nutdamp.schemes.block_model import fired
-
-    spacecraft = job.spacecraft
-    blocks, warnings = read_blocks(path, spacecraft)
-    pulses = fired(spacecraft, blocks)
-    job.doubt(*warnings, *broken_limits(spacecraft, pulses))
-    return Plan(
-        spacecraft, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True
-    )
 
 
 @click.command("animate", cls=SessionCommand)

@@ -601,6 +601,14 @@ class CommandsSection(Section):
     every: Annotated[list[Count], Length(1)] = Field(
         "Spins from one pulse to the next that can be chosen; default [1].", [1, 2], default=[1]
     )
+    per_turn: Annotated[int, Within(1, 2)] = Field(
+        "Blocks that may fire in the same turns, their pulses apart; default 1.", 2, default=1
+    )
+    delay_is: Literal["time", "angle"] = Field(
+        "time, or angle: that by which the Sun has turned since its pulse; default time.",
+        "angle",
+        default="time",
+    )
 
 
 class KeepSection(Section):

@@ -552,7 +552,8 @@ def _commands(section: keys.CommandsSection) -> Commands:
             [0, math.floor((width.max - width.min) / step * (1.0 + 1e-12))]
         )
     every = tuple(sorted(set(section.every)))
-    return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
+    repeated = section.max_count, every, step, section.per_turn
+    return Commands(section.delay_step, section.delay_max, widths, *repeated, section.delay_is)
 
 
 def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:

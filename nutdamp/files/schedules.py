@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,14 @@ from nutdamp.files.tabular import Row, Table
 from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.causes import broken_limits
 from nutdamp.planning.plan import Plan
+from nutdamp.schemes.block_model import fired
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.spacecraft.constraints import misfits
-from nutdamp.spacecraft.equipment import Block, Channel
+from nutdamp.spacecraft.equipment import ANGLE, Block, Channel, firings
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import (
     STEERABLE,
+    TOUCHING,
     Pulse,
     Schedule,
     channel_pulse,
@@ -60,39 +63,56 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not
     have.
 
-    delay_counts and width_counts do for delay_s and width_s where the spacecraft file has the
-    steps; every is 1 where it is left out. Raises CannotRead, and FaultyFile with every fault of
-    the file.
+    Of the columns of a delay or width the first that there is counts: delay_s, delay_counts,
+    delay_deg, the last one first where the delays of the spacecraft file are angles. Counts need
+    the steps of that file; every is 1 where it is left out. Raises CannotRead, and FaultyFile with
+    every fault of the file.
     """
     table = Table(path, BLOCKS_HEADER, "blocks")
+    commands = spacecraft.commands
     columns = {}
     for name in TIMES:
-        counted = f"{name}_counts" in table.header and f"{name}_s" not in table.header
-        columns[name] = f"{name}_counts" if counted else f"{name}_s"
-        if counted and spacecraft.commands is None:
+        choice = [f"{name}_s", f"{name}_counts", *["delay_deg"] * (name == "delay")]
+        if commands is not None and commands.delay_is == ANGLE:
+            choice.sort(key=lambda column: column != "delay_deg")
+        columns[name] = next((each for each in choice if each in table.header), f"{name}_s")
+        if columns[name].endswith("_counts") and commands is None:
             problem = f"the spacecraft file has no commands to count the {name} in"
             table.fault(1, columns[name], f"{problem}; expected the column {name}_s")
     table.expect("channel", "first_sun_pulse", *columns.values(), "count")
-    blocks: list[Block] = []
-    for row in table.rows:
-        block = _block(row, spacecraft, columns)
-        if block is None:
-            continue
-        last = blocks[-1].sun_pulses[-1] if blocks else 0
-        if block.first <= last:
-            problem = f"Sun pulse {block.first} comes before the block before is over"
-            row.fault("first_sun_pulse", f"{problem}; expected {last + 1} or later")
-        for column, value, possible in misfits(spacecraft.commands, block):
-            row.warn(column, f"{column} = {value} cannot be commanded, {possible}: flown as given")
-        blocks.append(block)
-    total = sum(block.count for block in blocks)
+    blocks = {row.line: _block(row, spacecraft, columns) for row in table.rows}
+    rows = [row for row in table.rows if blocks[row.line] is not None]
+    read = tuple(block for block in blocks.values() if block is not None)
+    for index, column, value, possible in misfits(spacecraft, read):
+        text = f"{column} = {value} cannot be commanded, {possible}: flown as given"
+        rows[index].warn(column, text)
+    total = sum(block.count for block in read)
     if total > MOST_FIRED:
         table.fault(1, "count", f"the blocks fire {total} pulses; expected at most {MOST_FIRED}")
     table.check()
-    return tuple(blocks), table.warned
+    _expect_apart(rows, read, columns["delay"])
+    table.check()
+    return read, table.warned
 
 
 TIMES = ("delay", "width")
+
+
+def _expect_apart(rows: Sequence[Row], blocks: Sequence[Block], column: str) -> None:
+    """Keep a fault in ``column`` of each block with a pulse that begins before another of the same
+    Sun pulse is over; angles apart are times apart once they are flown.
+    """
+    overlapped = set[int]()
+    for before, after in pairwise(firings(blocks)):
+        together = before.number == after.number and before.block.angle == after.block.angle
+        least = before.block.delay + before.block.width
+        if not together or after.block.delay >= least - TOUCHING or after.at in overlapped:
+            continue
+        overlapped.add(after.at)
+        line = rows[before.at].line
+        problem = f"Sun pulse {after.number} fires it while the pulse of line {line} is on"
+        cure = f"{least:.6g} s or more after the Sun pulse, or other Sun pulses"
+        rows[after.at].fault(column, f"{problem}; expected {cure}")
 
 
 def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block | None:
@@ -104,6 +124,12 @@ def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Bloc
         cure = cure_of(name, channels)
         row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
     delay, width = (_time(row, spacecraft, name, column) for name, column in columns.items())
+    angle = 0.0
+    commands = spacecraft.commands
+    if columns["delay"] == "delay_deg":
+        angle, delay = math.radians(delay or 0.0), 0.0
+    elif columns["delay"] == "delay_counts" and commands and commands.delay_is == ANGLE:
+        angle, delay = abs(spacecraft.spin) * (delay or 0.0), 0.0
     if width == 0.0:
         row.fault(columns["width"], "0 s fires nothing; expected a time above 0")
     row.setdefault("every", "1")
@@ -112,7 +138,7 @@ def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Bloc
     every = _whole(row, "every", LATEST)
     if len(row.table.faults) > faults:
         return None
-    return Block(name, first, delay or 0.0, width or 0.0, count, every)
+    return Block(name, first, delay or 0.0, width or 0.0, count, every, angle)
 
 
 def _whole(row: Row, column: str, highest: int) -> int:
@@ -124,7 +150,9 @@ def _whole(row: Row, column: str, highest: int) -> int:
 
 
 def _time(row: Row, spacecraft: Spacecraft, name: str, column: str) -> float | None:
-    """A delay or width, s: as it is given, or so many steps; None for a fault."""
+    """A delay or width, s: as it is given (deg in such a column), or so many steps; None for a
+    fault.
+    """
     commands = spacecraft.commands
     value = row.number(column)
     if value is None:
@@ -132,7 +160,7 @@ def _time(row: Row, spacecraft: Spacecraft, name: str, column: str) -> float | N
     if value < 0.0:
         row.fault(column, f"{row[column]} is negative; expected at least 0")
         return None
-    if column.endswith("_s") or commands is None:
+    if not column.endswith("_counts") or commands is None:
         return value
     if not value.is_integer():
         row.fault(column, f"expected a whole number of steps, got {row[column]}")
@@ -179,12 +207,24 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
 
 
 def read_plan(
-    path: str | Path, spacecraft: Spacecraft, options: SchemeOptions | None = None
+    path: str | Path,
+    spacecraft: Spacecraft,
+    options: SchemeOptions | None = None,
+    *,
+    blocks: bool | None = None,
 ) -> tuple[Plan, tuple[str, ...]]:
-    """A schedule file as a plan of that name, and warnings, of broken limits too; raises as
-    `read_pulses` does.
+    """A schedule file, of pulses or of ``blocks`` (None: as its columns are), as a plan of that
+    name, and warnings, of broken limits too; raises as `read_pulses` does, and Infeasible without
+    Sun pulses.
     """
-    pulses, warnings = read_pulses(path, spacecraft)
+    if blocks is None:
+        header = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses").header
+        blocks = "first_sun_pulse" in header
+    if blocks:
+        commanded, warnings = read_blocks(path, spacecraft)
+        pulses = fired(spacecraft, commanded)
+    else:
+        pulses, warnings = read_pulses(path, spacecraft)
     plan = Plan(
         spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True
     )

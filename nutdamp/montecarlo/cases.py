@@ -294,6 +294,7 @@ class DispersedModel:
         if STEERABLE not in self._members and spacecraft.torquer is not None:
             self._members[STEERABLE] = ()
         self._actuations = tuple(map(self._actuation, schedule))
+        self._fired_with = schedule.fired_with
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -402,7 +403,8 @@ class DispersedModel:
         opened = self._opened(actuation, draws)
         width = self.on_times[index]
         number = index + 1
-        late = plus(draws.get("timing offset", 0.0), draws.get(f"Sun pulse {number}", 0.0))
+        jitter = draws.get(f"Sun pulse {self._fired_with[index]}", 0.0)
+        late = plus(draws.get("timing offset", 0.0), jitter)
         shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
         pulse = actuation.pulse
         start = actuation.pulse.start

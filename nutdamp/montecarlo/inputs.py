@@ -220,7 +220,7 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
     sensor = spacecraft.sun_sensor
     if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
         jitter = Tolerance("normal", sensor.jitter)
-        names = [f"Sun pulse {number}" for number in numbers]
+        names = [f"Sun pulse {number}" for number in dict.fromkeys(schedule.fired_with)]
         yield _Row("sun_sensor.jitter", jitter, names, 0.0, "s")
     yield _Row("attitude", requested.attitude, ["attitude x", "attitude y"], 0.0, "rad")
     idle = "a schedule is fired whatever a sensor shows: --loop flies the loop"

@@ -46,6 +46,7 @@ from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
 from nutdamp.schemes.block_model import fire_all, pushes
+from nutdamp.spacecraft.equipment import firings
 
 Array = NDArray[np.float64]
 
@@ -300,13 +301,10 @@ def fly(
         clock = SunPulseClock(
             start, sun[:, rows], math.copysign(1.0, spacecraft.spin), azimuth[rows]
         )
-        commanded = (
-            (block, number) for block in model.schedule.blocks for number in block.sun_pulses
-        )
         sees_all = all(nominal)
         before = 0
         alike = np.ones(rows.stop - begin, dtype=bool)
-        for index, (block, number) in enumerate(commanded):
+        for index, (number, _, block) in enumerate(firings(model.schedule.blocks)):
             alike &= number <= len(passages)
             passage = int(passages[number - 1]) if number <= len(passages) else before + 1
             for between in () if sees_all else range(before + 1, passage):
@@ -335,9 +333,8 @@ def fly(
                         for per_kg in cases.per_kg
                     ]
                 )
-            fired = clock.fire(
-                sun_pulse, block.delay + part(shifts[index]), block.width, torques, sheds
-            )
+            delay = block.delay + clock.turning(part(block.angle)) + part(shifts[index])
+            fired = clock.fire(sun_pulse, delay, block.width, torques, sheds)
             starts[index, rows] = fired + part(cases.leads[index])
             if watch is not None:
                 for here, end in clock.passed:

@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import accumulate
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -156,10 +155,11 @@ def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bo
     """One row a pulse or block, as it is commanded, with the nutation after it."""
     flown, spacecraft, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
     blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(pulses)
-    counts = [*accumulate(1 if block is None else block.count for block in blocks)]
-    firsts = [pulses[count] for count in (0, *counts[:-1])]
+    own = plan.pulses.pulses_by_block
+    counts = [numbers[-1] + 1 for numbers in own]
+    firsts = [pulses[numbers[0]] for numbers in own]
     starts = np.array([pulse.loaded[0] for pulse in firsts])
-    turned = phases(flown)[np.array([0, *counts[:-1]])]
+    turned = phases(flown)[np.array([numbers[0] for numbers in own])]
     angles = flown.around_pulses()[1].nutation[np.array(counts) - 1].tolist()
     ends = [pulses[count - 1].over for count in counts]
     decide = [
@@ -210,9 +210,13 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> list[Column]:
         unit = "s" if spacecraft.commands is None else "s (counts)"
         delay = partial(_counted, spacecraft, "delay")
         width = partial(_counted, spacecraft, "width")
+
+        def by_sun(row: SheetRow) -> float | None:
+            return None if row.block is None else row.block.delay_at(spacecraft.spin)
+
         fired = [
             Column("", Shared.FIRST_SUN_PULSE, "", attrgetter("block.first")),
-            Column("", Shared.DELAY, unit, attrgetter("block.delay"), delay),
+            Column("", Shared.DELAY, unit, by_sun, delay),
             Column("", Shared.ON_TIME, unit, attrgetter("block.width"), width),
             Column("", Shared.PULSES, "", attrgetter("block.count")),
             Column("", Shared.EVERY, "spin", attrgetter("block.every")),

@@ -353,6 +353,8 @@ class SunPulseClock:
         ahead, _ = self._ahead(start, self.sun)
         # as if one had come before t = 0
         self._number = 0
+        self._sun_pulse = start
+        self._fired_at = self._earlier = 0
         self.time = start.since + (ahead - CIRCLE) / self._pace
         self.lost = np.zeros(len(start.since), dtype=bool)
         self.moves = self.looked_back = 0
@@ -367,9 +369,8 @@ class SunPulseClock:
         """Stretches from the end of the last pulse but one to that of the last,
         each with its end.
         """
-        return zip(
-            self._stretches, (stretch.since for stretch in self._stretches[1:]), strict=False
-        )
+        stretches = self._stretches[self._earlier :]
+        return zip(stretches, (stretch.since for stretch in stretches[1:]), strict=False)
 
     def fire(
         self,
@@ -386,6 +387,8 @@ class SunPulseClock:
         the previous pulse.
         """
         before = self.here
+        # What was fired after the same Sun pulse is kept: the next Sun pulse may come before it.
+        earlier = self._stretches[:-1] if self._fired_at == self._number else []
         half = None if sheds is None else 0.5 * sheds
         starts: Array = np.maximum(sun_pulse.since + delay, self.over)
         self.over = starts + reduce(np.maximum, (push.end for push in pushes), width)
@@ -400,7 +403,8 @@ class SunPulseClock:
                 begun.since[late]
             )[2:4]
         begun = begun._replace(bodies=before.bodies.lighter(half))
-        self._stretches = [before]
+        self._stretches = [*earlier, before]
+        self._earlier, self._fired_at = len(earlier), self._number
         for push in pushes:
             length = np.where(push.end - push.begin == 0.0, 1.0, push.end - push.begin)
             slope = (
@@ -417,7 +421,7 @@ class SunPulseClock:
         """Motion at the Sun pulse of this ``number``, if nothing is fired before; numbers must not
         decrease.
         """
-        stretch = self.here
+        stretch = self._sun_pulse
         while self._number < number:
             step = min(number - self._number, AHEAD)
             pace, (ahead, _) = self._pace, self._ahead(self.here, self.sun)
@@ -429,12 +433,27 @@ class SunPulseClock:
             astray = np.abs(stretch.since - expected) * pace > math.pi
             self.lost |= astray | (rate <= 0.0) | ~(np.abs(off) < 1e-6)
             self._number = self._number + step
+            self._sun_pulse = stretch
             self.time = stretch.since
             # From one Sun pulse to the next: seen one by one, each from the end of the last pulse
             # on, they took steps of integration by the square of their number.
             if np.all((stretch.since >= self.here.since) | self.lost):
                 self._latest = stretch
         return stretch
+
+    def turning(self, angle: Array) -> Array:
+        """Time (n,) s in which the Sun turns by an ``angle`` (n,) rad from the last Sun pulse on,
+        if nothing more is fired.
+        """
+        since: Array = self._sun_pulse.since
+        if not np.any(angle):
+            return np.zeros(len(since))
+        pace = self._pace
+        expected = np.maximum(since + angle / pace, self.here.since)
+        turned = self._root(
+            self.here.moved(expected), pace, self.sun, (angle > 0.0) & ~self.lost, angle
+        )
+        return np.asarray(np.where(angle > 0.0, turned.since - since, 0.0))
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
@@ -471,11 +490,13 @@ class SunPulseClock:
         pace: Array,
         sun: Array,
         wanted: NDArray[np.bool_] | None = None,
+        angle: Array | None = None,
     ) -> MotionStretch:
-        """Motion as the Sun passes the sensor, at the time nearest to that of ``start``: by
-        Newton's method, of those ``wanted`` (n,), default all.
+        """Motion as the Sun passes the sensor, or an ``angle`` (n,) rad behind it, at the time
+        nearest to that of ``start``: by Newton's method, of those ``wanted`` (n,), default all.
         """
         here = start
+        behind = 0.0 * start.since if angle is None else angle
         count = len(start.since)
         pending = np.ones(count, dtype=bool) if wanted is None else wanted.copy()
         # A pulse more than half a turn off is lost. Under thrust Newton's steps may go on for
@@ -489,7 +510,7 @@ class SunPulseClock:
             few = 2 * len(rows) < count
             rows = rows if few else np.arange(count)
             some = here.some(rows) if few else here
-            off, rate = self._off(some, sun[:, rows])
+            off, rate = self._off(some, sun[:, rows], behind[rows])
             # Where the Sun is near the axis its azimuth may not change for a moment: then by the
             # mean rate.
             time = some.since + off / np.where(rate > 0.1 * pace[rows], rate, pace[rows])
@@ -503,12 +524,14 @@ class SunPulseClock:
                 here = moved
         return here
 
-    def _off(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
-        """Angle (n,) in [-π, π) by which the body has to turn until the Sun passes the sensor, and
-        its rate.
+    def _off(
+        self, here: MotionStretch, sun: Array, behind: Array | float = 0.0
+    ) -> tuple[Array, Array]:
+        """Angle (n,) in [-π, π) by which the body has to turn until the Sun is ``behind`` the
+        sensor by that angle, rad, and its rate.
         """
         ahead, rate = self._ahead(here, sun)
-        return (ahead + math.pi) % CIRCLE - math.pi, rate
+        return (ahead + behind + math.pi) % CIRCLE - math.pi, rate
 
     def _ahead(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
         """`_off` in [0, 2π)."""

@@ -179,10 +179,10 @@ class Plan(results.Data, results.Tabled):
         Pulses and blocks read from a file have to keep its limits and commands too.
         """
         spacecraft, pulses = self.spacecraft, self.pulses
-        if self.from_file:
-            off = any(misfits(spacecraft.commands, block) for block in pulses.blocks)
-            if off or not keeps_limits(spacecraft, pulses):
-                return False
+        if self.from_file and (
+            any(misfits(spacecraft, pulses.blocks)) or not keeps_limits(spacecraft, pulses)
+        ):
+            return False
         return spacecraft.commands is None or bool(pulses.blocks) or not pulses.pulses
 
     @property

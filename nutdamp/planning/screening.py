@@ -35,7 +35,6 @@ from nutdamp.montecarlo.study import (
 from nutdamp.planning.plan import Plan, judge, unflown
 from nutdamp.planning.verdict import Cases, Verdict, cases_of
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.schedule import Schedule
 
 
@@ -285,12 +284,13 @@ def _range(values: object) -> Range:
 
 def first_pulses(schedule: Schedule, count: int) -> Schedule:
     """First ``count`` pulses of a schedule, and the blocks cut to them."""
-    blocks = list[Block]()
-    left = count
-    for block in schedule.blocks:
-        if left > 0:
-            blocks.append(replace(block, count=min(block.count, left)))
-        left -= block.count
+    numbers = schedule.pulses_by_block
+    counts = [sum(number < count for number in each) for each in numbers]
+    blocks = [
+        replace(block, count=number)
+        for block, number in zip(schedule.blocks, counts, strict=False)
+        if number
+    ]
     return replace(schedule, pulses=schedule.pulses[:count], blocks=tuple(blocks))
 
 

@@ -29,7 +29,7 @@ from nutdamp.physics.motion import MotionStretch
 from nutdamp.physics.series import Bodies
 from nutdamp.physics.sky import SunPulseClock, TorqueRamp, ahead
 from nutdamp.physics.thruster import Valve, spread
-from nutdamp.spacecraft.equipment import Block, Channel
+from nutdamp.spacecraft.equipment import Block, Channel, firings
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
@@ -248,11 +248,10 @@ def fire_all(
     schedule is the reason where there is no Sun pulse, a channel is not known, a pulse would begin
     before the one before is over, or the tank is empty.
     """
-    sun_pulses = SunPulses(
-        spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences]
-    )
+    queues = [firings(blocks) for blocks in sequences]
+    sun_pulses = SunPulses(spacecraft, [[each.number for each in queue] for queue in queues])
     supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
-    firings = [iter([block for block in blocks for _ in block.sun_pulses]) for blocks in sequences]
+    following = [iter(queue) for queue in queues]
     channels = {channel.name: channel for channel in spacecraft.channels}
     clock = sun_pulses.clock
     count = len(sequences)
@@ -270,11 +269,13 @@ def fire_all(
         moves = clock.moves
         stepped = STEPPED if arcs else INTEGRATED * turns + more
         work.spend(stepped + FIRED * len(flights) + back)
-        delays = motion.since * 0.0
-        widths = np.zeros(count)
+        delays, angles, widths = np.zeros((3, count))
         given = dict[int, Pulse]()
-        for flight in flights:
-            block = next(firings[flight])
+        due = {flight: next(following[flight]) for flight in flights}
+        for flight, (_, _, block) in due.items():
+            angles[flight], delays[flight] = block.angle, block.delay
+        delays += clock.turning(angles)
+        for flight, (number, index, block) in due.items():
             channel = channels.get(block.channel)
             if channel is None:
                 sun_pulses.fail(
@@ -282,12 +283,13 @@ def fire_all(
                 )
                 continue
             given[flight] = supplies[flight].fire(on_command(channel, 0.0, block.width), channel)
-            delays[flight], widths[flight] = block.delay, block.width
-            due = float(motion.since[flight] + delays[flight])
-            if due < over[flight] - 1e-9:
+            widths[flight] = block.width
+            start = float(motion.since[flight] + delays[flight])
+            if start < over[flight] - 1e-9:
                 text = (
-                    f"a pulse of {block.channel} would begin at {due:.6g} s, "
-                    "before the one before is over"
+                    f"block {index + 1}, Sun pulse {number}: a pulse of {block.channel} would "
+                    f"begin at {start:.6g} s, and the one before is over at {over[flight]:.6g} s; "
+                    "give them delays or Sun pulses farther apart"
                 )
                 sun_pulses.fail(flight, Infeasible(text))
         spent = np.zeros(count)

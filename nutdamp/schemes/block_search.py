@@ -591,13 +591,16 @@ class BlockSearch:
             return ()
         channel, every = self.kinds[int(sequences.kind[row])]
         count = int(sequences.count[row])
+        delay = float(sequences.delay[row])
+        delay, angle = self.commands.after_sun_pulse(delay, self.spacecraft.spin)
         block = Block(
             channel.name,
             int(sequences.first[row]),
-            float(sequences.delay[row]),
+            delay,
             float(sequences.width[row]),
             count,
             every if count > 1 else self.commands.every[0],
+            angle,
         )
         return (*self.blocks(sequences.before, int(sequences.parent[row])), block)
 
@@ -629,7 +632,8 @@ class BlockSearch:
             pairs = np.repeat(parent, width.size), width, counts.ravel()
             waits = np.arange(-1, 2) + block.first - self._following(before, parent)
             waits = waits[waits >= (self.earliest if before.before is None else self.pause)]
-            delays = block.delay + np.arange(-3, 4) * self.commands.delay_step
+            delay = block.delay_at(self.spacecraft.spin)
+            delays = delay + np.arange(-3, 4) * self.commands.delay_step
             parts = self.behind(
                 before, kind, pairs, waits, last=True, delays=self.commanded(delays), off=off
             )

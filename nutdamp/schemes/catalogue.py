@@ -134,11 +134,18 @@ class HalfConeOptions(SchemeOptions):
     )
 
 
+PER_TURN: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
+
+
 @dataclass(frozen=True, kw_only=True)
 class CommandBlockOptions(SchemeOptions):
-    """Options of command-block; ``max_blocks`` None: three, of which as few are used as suffice."""
+    """Options of command-block; ``max_blocks`` None: three, of which as few are used as suffice.
+
+    ``per_turn``: 1, or 2 as by ``commands.per_turn`` of the file.
+    """
 
     max_blocks: int | None = _option(None, COUNT, "Largest number of command blocks; default 3.")
+    per_turn: int = PER_TURN
 
     @property
     def uncorrected(self) -> bool:
@@ -152,7 +159,7 @@ class RhumbLineOptions(SchemeOptions):
 
     equal: ClassVar[bool] = True  # the width is one command
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
-    per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
+    per_turn: int = PER_TURN
 
 
 @dataclass(frozen=True, kw_only=True)

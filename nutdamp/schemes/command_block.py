@@ -28,7 +28,7 @@ from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
-from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.equipment import ANGLE, Block, Channel
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.roles import with_limits
@@ -129,8 +129,11 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
             "the file describes no commands: command blocks need the keys sun, "
             "sun_sensor and commands"
         )
+    if options.per_turn > 2:
+        raise Infeasible("blocks fire two pulses a turn at most: give --per-turn 1 or 2")
     tick = spacecraft.limits.tick
-    spacecraft = with_limits(spacecraft, tick=None)
+    commands = replace(commands, per_turn=max(options.per_turn, commands.per_turn))
+    spacecraft = replace(with_limits(spacecraft, tick=None), commands=commands)
     goal, most = spacecraft.goal.spin, options.max_blocks
     nutation = next(
         bound for bound in requirements.bounds(spacecraft) if bound.part is Part.NUTATION
@@ -140,20 +143,30 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     )
     if goal is not None:
         expect_spin(spacecraft, goal, alone=alone)
-    if alone:
+    chosen = None
+    if spacecraft.goal.axis is None:
+        chosen = opposite_blocks(spacecraft, most)
+    if chosen is None and alone:
         chosen = _searched(spacecraft, most)
-    else:
-        chosen = spin_and_turn(spacecraft, most)
-        missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
-        in_legs = (note("blocks-in-legs"), *missed * (not requirements.complies(chosen.rank[1])))
-        chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
+    elif chosen is None or not requirements.complies(chosen.rank[1]):
+        try:
+            in_legs = spin_and_turn(spacecraft, most)
+        except Infeasible:
+            if chosen is None:
+                raise
+        else:
+            notes = [note("blocks-in-legs")]
+            if not requirements.complies(in_legs.rank[1]):
+                notes += [*used_up(spacecraft, in_legs.schedule)] or [note("finer-commands")]
+            in_legs = in_legs._replace(schedule=replace(in_legs.schedule, notes=tuple(notes)))
+            chosen = min(filter(None, (chosen, in_legs)), key=lambda each: each.rank)
     steps = np.array([commands.delay_step, *commands.widths, commands.width_step or 0.0]) / (
         tick or 1.0
     )
-    notes = chosen.schedule.notes
+    notes = [*chosen.schedule.notes]
     if tick is not None and np.abs(steps - np.rint(steps)).max() > OFF_TICK:
-        notes = (*notes, note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step))
-    return replace(chosen.schedule, notes=notes)
+        notes.append(note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step))
+    return replace(chosen.schedule, notes=tuple(notes))
 
 
 def expect_spin(spacecraft: Spacecraft, spin: float, *, alone: bool) -> None:
@@ -183,7 +196,9 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     """
     commands = spacecraft.commands
     assert commands is not None
-    able = at_hand(spacecraft, usable(spacecraft, axial=spacecraft.goal.spin is not None))
+    # Opposite blocks undo what a torque about axis 3 does to the spin, and a last leg mends it.
+    axial = spacecraft.goal.spin is not None or commands.per_turn > 1
+    able = at_hand(spacecraft, usable(spacecraft, axial=axial))
     channels = [channel for channel in able if commandable_widths(commands, channel).size]
     if not channels:
         raise Infeasible(
@@ -208,6 +223,66 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     if not requirements.complies(chosen.rank[1]):
         notes += cures(search, chosen, most or BLOCKS)
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
+
+
+PHASES = 12  # delays of opposite blocks that are looked at, where the nutation makes a difference
+
+
+def opposite_blocks(spacecraft: Spacecraft, most: int | None) -> FlownSequence | None:
+    """The best flown of the pairs of like blocks half a turn apart that bring the spin to its goal,
+    of the fewest pulses that comply; None where there is no such pair.
+
+    What one pulse turns H by, the opposite one turns it back, but for what the spin changes
+    between them. By several delays, where there is nutation to be taken along.
+    """
+    search = BlockSearch(spacecraft, usable(spacecraft, axial=True), 2)
+    commands, turn, goal = search.commands, search.model.turn, spacecraft.goal.spin
+    if goal is None or commands.per_turn < 2 or most == 1:
+        return None
+    change = (goal - spacecraft.spin) * spacecraft.inertia.C
+    first, half = search.earliest + 1, 0.5 * turn
+    phases = half / PHASES * np.arange(PHASES if spacecraft.nutation > 0.0 else 1)
+    delays = np.unique(search.commanded(phases)).tolist()
+    pairs = list[tuple[Block, Block]]()
+    for channel in search.channels:
+        for count in range(1, search.allowed // 2 + 1):
+            on_time = change / (2.0 * count * channel.axial) if channel.axial else 0.0
+            if on_time <= 0.0:
+                break
+            loaded = on_time if channel.valve is None else channel.valve.on_time_for(on_time)
+            width = round(commands.nearest_width(loaded), 12)
+            able = commandable_widths(commands, channel, width - 1e-12, width + 1e-12, 1).size
+            if not able or width + spacecraft.limits.gap > half:
+                continue
+            for delay in delays:
+                begins = delay, float(search.commanded(np.array(delay + half)))
+                before, after = (commands.after_sun_pulse(at, spacecraft.spin) for at in begins)
+                block = Block(channel.name, first, before[0], width, count, 1, before[1])
+                pairs.append((block, replace(block, delay=after[0], angle=after[1])))
+    pairs.sort(key=lambda pair: pair[0].count)
+    flights, pulses = search.flights, 0
+    for begin in range(0, len(pairs), PHASES):
+        some = pairs[begin : begin + PHASES]
+        pulses += sum(2 * block.count for block, _ in some)
+        if begin and (pulses > FLOWN_PULSES or work.exhausted()):
+            break
+        flights.fly(some, [0.0] * len(some))
+        if math.isfinite(flights.cheapest):
+            break
+    if not flights.of:
+        return None
+    chosen = flights.chosen()
+    scope = note("blocks-opposite", flown=len(flights.of))
+    return chosen._replace(schedule=replace(chosen.schedule, notes=(scope,)))
+
+
+def _sets_spin(spacecraft: Spacecraft, flight: FlownSequence) -> bool:
+    """True where a flight keeps limits and bounds, but for a nutation that a further leg damps."""
+    shares = BlockFlights(spacecraft).shares(
+        left_by(propagation.flown(spacecraft, flight.schedule))
+    )
+    shares.pop(Part.NUTATION, None)
+    return not flight.rank[0] and all(map(requirements.complies, shares.values()))
 
 
 LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twice
@@ -247,7 +322,10 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
                 if leg is None or (room is not None and room < 1):
                     continue
                 try:
-                    legs.fire(_searched(leg, room).schedule)
+                    best = None if turning else opposite_blocks(leg, room)
+                    if best is None or not _sets_spin(leg, best):
+                        best = _searched(leg, room)
+                    legs.fire(best.schedule)
                 except Infeasible:
                     if number < 2:
                         raise
@@ -287,7 +365,7 @@ def turn_leg(spacecraft: Spacecraft, at_leg: Spacecraft) -> Spacecraft | None:
         nutation *= MARGIN * _slower(spacecraft, at_leg)
         shift = None if shift is None else MARGIN * shift
         horizon = max(horizon - _least_time(at_leg, goal), 0.5 * horizon)
-    return _leg(at_leg, None, (nutation, shift), horizon)
+    return _leg(spacecraft, at_leg, None, (nutation, shift), horizon)
 
 
 def spin_leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float) -> Spacecraft | None:
@@ -300,7 +378,8 @@ def spin_leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float) -> Spacecra
     nutation = max(at_leg.nutation / _slower(spacecraft, at_leg) / MARGIN, nutation)
     shift = None if shift is None else max(at_leg.to_turn / MARGIN, shift)
     spinning = tuple(channel for channel in at_leg.channels if not channel.damps)
-    return _leg(replace(at_leg, channels=spinning), aim, (nutation, shift), at_leg.horizon)
+    at_leg = replace(at_leg, channels=spinning)
+    return _leg(spacecraft, at_leg, aim, (nutation, shift), at_leg.horizon)
 
 
 def _slower(spacecraft: Spacecraft, at_leg: Spacecraft) -> float:
@@ -311,16 +390,27 @@ def _slower(spacecraft: Spacecraft, at_leg: Spacecraft) -> float:
 
 
 def _leg(
+    spacecraft: Spacecraft,
     at_leg: Spacecraft,
     spin: float | None,
     bounds: tuple[float, float | None],
     horizon: float,
 ) -> Spacecraft:
-    """Spacecraft of a leg, with its own goal and requirement."""
+    """Spacecraft of a leg, with its own goal and requirement, and steps of angle as at t = 0."""
+    commands = at_leg.commands
+    assert commands is not None
+    if commands.delay_is == ANGLE:
+        longer = abs(spacecraft.spin / at_leg.spin)
+        commands = replace(
+            commands,
+            delay_step=commands.delay_step * longer,
+            delay_max=commands.delay_max * longer,
+        )
     axis = None if bounds[1] is None else at_leg.goal.axis
     return replace(
         at_leg,
         goal=replace(at_leg.goal, axis=axis, spin=spin),
+        commands=commands,
         requirement=Requirement(*bounds),
         limits=replace(at_leg.limits, horizon=horizon),
     )

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.spacecraft.equipment import Block, Channel, Commands
+from nutdamp.spacecraft.equipment import ANGLE, Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import (
     RESOLUTION,
@@ -301,29 +301,40 @@ def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
     return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
 
 
-def misfits(commands: Commands | None, block: Block) -> list[tuple[str, str, str]]:
-    """Values of a block that are no command of the file: column, value, what is near or allowed."""
+def misfits(spacecraft: Spacecraft, blocks: Sequence[Block]) -> Iterator[tuple[int, str, str, str]]:
+    """Values of blocks that are no command of the file: number of the block, from 0, column, value,
+    what is near or allowed.
+    """
+    commands = spacecraft.commands
     if commands is None:
-        return []
+        return
     longest = (
         math.floor(commands.delay_max / commands.delay_step * (1.0 + OFF_TICK))
         * commands.delay_step
     )
-    nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
-    nearest_width = commands.nearest_width(block.width)
-    off = [
-        (column, f"{value:.6g} s", f"{near:.6g} s is the nearest")
+    for index, block in enumerate(blocks):
+        delay = block.delay_at(spacecraft.spin)
+        nearest_delay = min(round(delay / commands.delay_step) * commands.delay_step, longest)
+        nearest_width = commands.nearest_width(block.width)
         for column, value, near, slack in (
-            ("delay_s", block.delay, nearest_delay, OFF_TICK * commands.delay_step),
+            ("delay_s", delay, nearest_delay, OFF_TICK * commands.delay_step),
             ("width_s", block.width, nearest_width, OFF_TICK * block.width),
-        )
-        if abs(value - near) > slack
-    ]
-    if block.count > commands.max_count:
-        off.append(("count", str(block.count), f"{commands.max_count} is the most"))
-    if block.every not in commands.every:
-        off.append(("every", str(block.every), f"only {', '.join(map(str, commands.every))}"))
-    return off
+        ):
+            if abs(value - near) > slack:
+                yield index, column, f"{value:.6g} s", f"{near:.6g} s is the nearest"
+        if block.delay and commands.delay_is == ANGLE:
+            yield index, "delay_s", f"{block.delay:.6g} s", "commands.delay_is is angle"
+        if block.angle and commands.delay_is != ANGLE:
+            angle = math.degrees(block.angle)
+            yield index, "delay_deg", f"{angle:.6g} deg", "commands.delay_is is time"
+        if block.count > commands.max_count:
+            yield index, "count", str(block.count), f"{commands.max_count} is the most"
+        if block.every not in commands.every:
+            yield index, "every", str(block.every), f"only {', '.join(map(str, commands.every))}"
+        together = sum(each.first <= block.first <= each.sun_pulses[-1] for each in blocks)
+        if together > commands.per_turn:
+            allowed = f"{together} blocks fire in the same turns, commands.per_turn allows"
+            yield index, "first_sun_pulse", str(block.first), f"{allowed} {commands.per_turn}"
 
 
 def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:

@@ -8,9 +8,10 @@ each spin, and the steps of command blocks; the sensor, law and faults of a clos
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,13 +48,18 @@ class SunSensor:
         return abs(0.5 * math.pi - sun_angle - self.elevation) <= self.half_width
 
 
+TIME, ANGLE = "time", "angle"
+"""What a delay is: so many seconds, or an angle by the clock of Sun sectors."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
     """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,)
     s, at most ``max_count`` pulses, one in ``every`` so many spins.
 
     With a ``width_step`` the widths are the shortest and the longest of all in such steps, which no
-    array lists.
+    array lists. So many blocks as ``per_turn`` may fire in the same turns. ``delay_is`` one of the
+    names below: by `ANGLE` the step and the longest delay are those at the spin of t = 0.
     """
 
     delay_step: float
@@ -62,6 +68,12 @@ class Commands:
     max_count: int
     every: tuple[int, ...]
     width_step: float | None = None
+    per_turn: int = 1
+    delay_is: str = TIME
+
+    def after_sun_pulse(self, delay: float, spin: float) -> tuple[float, float]:
+        """A ``delay``, s, at a ``spin``, rad/s, as delay and angle of a `Block`."""
+        return (0.0, delay * abs(spin)) if self.delay_is == ANGLE else (delay, 0.0)
 
     def some_widths(self, least: float, most: float, count: int) -> Vector:
         """Widths from ``least`` to ``most`` s that can be commanded; ``count`` of steps."""
@@ -95,7 +107,7 @@ class Commands:
 @dataclass(frozen=True, slots=True)
 class Block:
     """``count`` pulses of ``channel``, each ``width`` s long and begun ``delay`` s after a Sun
-    pulse.
+    pulse, or after the Sun has turned on by an ``angle``, rad in the body.
 
     ``first`` is the number of the Sun pulse of the first one, 1 the first after t = 0; from then on
     every ``every``-th Sun pulse fires one.
@@ -107,11 +119,36 @@ class Block:
     width: float
     count: int
     every: int = 1
+    angle: float = 0.0
+
+    def delay_at(self, spin: float) -> float:
+        """Time from the Sun pulse to a start, s, at a steady ``spin``, rad/s."""
+        return self.delay + self.angle / abs(spin)
 
     @property
     def sun_pulses(self) -> range:
         """Numbers of the Sun pulses that fire it."""
         return range(self.first, self.first + self.count * self.every, self.every)
+
+
+class BlockPulse(NamedTuple):
+    """A pulse of the ``block`` at this place in its row, from 0, fired by the Sun pulse of a
+    ``number``.
+    """
+
+    number: int
+    at: int
+    block: Block
+
+
+def firings(blocks: Sequence[Block]) -> list[BlockPulse]:
+    """One queue of the pulses of all blocks: by Sun pulses, of one Sun pulse by their delays."""
+    queue = [
+        BlockPulse(number, index, block)
+        for index, block in enumerate(blocks)
+        for number in block.sun_pulses
+    ]
+    return sorted(queue, key=lambda each: (each.number, each.block.angle, each.block.delay))
 
 
 GYRO, ACCELEROMETER = "gyro", "accelerometer"

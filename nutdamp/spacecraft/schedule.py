@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from nutdamp.common.results import Note
-from nutdamp.spacecraft.equipment import Block, Channel, Steerable
+from nutdamp.spacecraft.equipment import Block, Channel, Steerable, firings
 from nutdamp.spacecraft.model import Vector
 
 if TYPE_CHECKING:
@@ -291,11 +291,32 @@ class Schedule:
     def __len__(self) -> int:
         return len(self.pulses)
 
+    @property
+    def pulses_by_block(self) -> list[list[int]]:
+        """Numbers, from 0, of the pulses of each block, or of each pulse alone."""
+        if not self.blocks:
+            return [[number] for number in range(len(self.pulses))]
+        numbers: list[list[int]] = [[] for _ in self.blocks]
+        for number, firing in enumerate(firings(self.blocks)):
+            numbers[firing.at].append(number)
+        return numbers
+
     def __iter__(self) -> Iterator[Pulse]:
         return iter(self.pulses)
 
     def __getitem__(self, index: int) -> Pulse:
         return self.pulses[index]
+
+    @property
+    def fired_with(self) -> list[int]:
+        """Number, from 1, of the first pulse that is fired by the same Sun pulse as each; without
+        blocks its own.
+        """
+        if not self.blocks:
+            return list(range(1, len(self.pulses) + 1))
+        first: dict[int, int] = {}
+        queue = enumerate(firings(self.blocks), start=1)
+        return [first.setdefault(firing.number, number) for number, firing in queue]
 
     @property
     def without_proof(self) -> Schedule:

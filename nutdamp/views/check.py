@@ -24,6 +24,7 @@ from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.planning.notes import shift_notes, spacecraft_notes
+from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
@@ -372,7 +373,8 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         delays = (commands.delay_step, commands.delay_max)
         spin = abs(spacecraft.spin)
         step, longest = (f"{duration(time)} = {degrees(spin * time)}" for time in delays)
-        yield "delay", f"in steps of {step} of spin, up to {longest}"
+        clocked = "angle, " if commands.delay_is == ANGLE else ""
+        yield "delay", f"{clocked}in steps of {step} of spin, up to {longest}"
         widths = [duration(width) for width in commands.widths.tolist()]
         stepped = commands.width_step
         steps = (
@@ -382,7 +384,9 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         )
         yield "width", steps or listed(widths, "or")
         every = listed([str(count) for count in commands.every], "or")
-        yield "block", f"at most {commands.max_count} pulses; every: {every} of the spins"
+        together = "; two in the same turns" if commands.per_turn > 1 else ""
+        counted = f"at most {commands.max_count} pulses; every: {every} of the spins"
+        yield "block", f"{counted}{together}"
 
 
 def _margins(spacecraft: Spacecraft) -> DataTable:

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -255,7 +254,13 @@ class BlockRow(NamedTuple):
 
 def _counts(name: str, row: BlockRow) -> int | None:
     commands = row.spacecraft.commands
-    return None if commands is None else commands.counts(name, getattr(row.block, name))
+    time = _delay(row) if name == "delay" else row.block.width
+    return None if commands is None else commands.counts(name, time)
+
+
+def _delay(row: BlockRow) -> float:
+    """Delay of a block, s; of an angle that at the spin of t = 0."""
+    return row.block.delay_at(row.spacecraft.spin)
 
 
 def _nine(value: float) -> float:
@@ -278,7 +283,7 @@ BLOCKS = (
         where="csv page",
         kind=TEXT,
     ),
-    Column.named("delay_s=block.delay", Shared.DELAY, "s", to_figures(6), EVERYWHERE),
+    Column("delay_s", Shared.DELAY, "s", _delay, to_figures(6), EVERYWHERE),
     Column(
         "delay_counts",
         Shared.DELAY,
@@ -291,7 +296,9 @@ BLOCKS = (
         "delay_deg",
         Shared.DELAY,
         "deg",
-        lambda row: _nine(math.degrees(row.block.delay * abs(row.spacecraft.spin))),
+        lambda row: _nine(
+            math.degrees(row.block.angle + row.block.delay * abs(row.spacecraft.spin))
+        ),
         lambda angle: f"{angle:.2f}",
         EVERYWHERE,
     ),
@@ -323,17 +330,10 @@ def block_table(flown: Flight) -> DataTable:
     pulses = flown.schedule.pulses
     spacecraft = flown.spacecraft
     rows = []
-    lasts = accumulate(block.count for block in flown.schedule.blocks)
-    for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True)):
-        rows.append(
-            BlockRow(
-                index,
-                block,
-                spacecraft,
-                pulses[last - block.count : last],
-                float(after.nutation[last - 1]),
-            )
-        )
+    numbers = flown.schedule.pulses_by_block
+    for index, (block, own) in enumerate(zip(flown.schedule.blocks, numbers, strict=False)):
+        fired = tuple(pulses[number] for number in own)
+        rows.append(BlockRow(index, block, spacecraft, fired, float(after.nutation[own[-1]])))
     return DataTable("Command blocks", BLOCKS, rows, flown.schedule)
 
 
@@ -341,17 +341,14 @@ def block_table(flown: Flight) -> DataTable:
 EVENLY = 8
 
 
-def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:
+def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
     """The pulses that a screen shows: all, but of long blocks only some."""
-    if not blocks:
-        return table
-    shown: list[int] = []
-    for last, block in zip(accumulate(block.count for block in blocks), blocks, strict=True):
-        step = max(math.ceil((block.count - 1) / (EVENLY - 1)), 1)
-        shown += sorted({*range(last - block.count, last, step), last - 1})
-    rows = [
-        table.rows[index] for index in shown if index < len(table.rows)
-    ]  # a track may end before the last one
+    shown = set[int]()
+    for own in schedule.pulses_by_block:
+        step = max(math.ceil((len(own) - 1) / (EVENLY - 1)), 1)
+        shown |= {*own[::step], own[-1]}
+    # a track may end before the last one
+    rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
     return replace(table, rows=rows)
 
 

@@ -143,7 +143,7 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     if schedule.blocks:
         yield parts.blocks_screen(flight, simulation.plan.delta_v)
     if len(schedule):
-        shown = parts.shown_rows(parts.pulse_table(flight), schedule.blocks)
+        shown = parts.shown_rows(parts.pulse_table(flight), schedule)
         yield shown.screen("simulate")
         if len(shown.rows) < len(schedule):
             yield Text(

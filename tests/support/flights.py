@@ -61,9 +61,12 @@ def by_blocks(
     *,
     spin: float = -2.0,
     moments: tuple[float, float, float] = (110.0, 110.0, 150.0),
+    interleaved: bool = False,
     **fields: Any,
 ) -> DispersedModel:
-    """Three blocks of two thrusters, one with axial torque, of an oblate body with 2 deg."""
+    """Three blocks of two thrusters, one with axial torque, of an oblate body with 2 deg;
+    ``interleaved``: all in the same turns, by angles.
+    """
     body = spinner(
         moments=moments, spin=spin, degrees=2.0, channels=(channel("T", 8.0, 3.0, 2.0), *cross(9.0))
     )
@@ -73,6 +76,12 @@ def by_blocks(
         Block("+1", 19, 0.96 * turn, 0.07 * turn, 4, 1),  # still on when the next Sun pulse comes
         Block("-2", 26, 0.1 * turn, 0.03 * turn, 5, 2),
     )
+    if interleaved:
+        blocks = (
+            Block("T", 2, 0.0, 0.05 * turn, 6, 1, angle=4.0),
+            Block("+1", 3, 0.0, 0.07 * turn, 4, 1, angle=0.4),
+            Block("-2", 1, 0.02 * turn, 0.03 * turn, 5, 2, angle=2.0),
+        )
     body = replace(commanded(body, np.array([1.0, 0.3, -0.4])), dispersions=dispersions, **fields)
     return DispersedModel(body, fired(body, blocks))
 

@@ -1,9 +1,11 @@
 """Spinners commanded by blocks, and their flight by an integrator of its own."""
 
+import cmath
 import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,19 +106,24 @@ def flown_by_reference(
             [(torque - cross_ @ (moments * w)) / moments, (rotation @ cross_).ravel()]
         )
 
-    def behind(y: Array) -> float:
-        """Sine of the angle by which the Sun is past the sensor, and positive cosine near it."""
+    def seen_at(y: Array, azimuth: float) -> complex:
+        """The Sun across the axis, turned so that it is real and positive at this azimuth."""
         seen = y[3:].reshape(3, 3).T @ sun
-        return float(math.cos(mark) * seen[1] - math.sin(mark) * seen[0])
+        return complex(seen[0], seen[1]) * cmath.exp(-1j * azimuth)
 
-    def before(y: Array) -> bool:
-        seen = y[3:].reshape(3, 3).T @ sun
-        return bool(math.cos(mark) * seen[0] + math.sin(mark) * seen[1] > 0.0)
+    def passages(at: Any, until: float, azimuth: float) -> list[float]:
+        """When the Sun passes an azimuth from now on, by the motion ``at`` a time."""
+        grid = np.linspace(now, until, max(int(48 * (until - now) / turn), 4) + 1)
+        values = [seen_at(at(t), azimuth) for t in grid]
+        return [
+            float(brentq(lambda t: seen_at(at(t), azimuth).imag, *edge, xtol=1e-13))
+            for edge, pair in zip(itertools.pairwise(grid), itertools.pairwise(values), strict=True)
+            if pair[0].imag * pair[1].imag < 0.0 and pair[0].real > 0.0
+        ]
 
-    def move(until: float, torque: Array, *, stops: bool = False) -> list[float]:
-        """Sun pulses on the way; ``state`` and ``now`` go on, or to the first (``stops``)."""
-        nonlocal state, now
-        found = solve_ivp(
+    def integrated(until: float, torque: Array) -> Any:
+        """Motion from now on, by time."""
+        return solve_ivp(
             slope,
             (now, until),
             state,
@@ -125,34 +132,37 @@ def flown_by_reference(
             atol=1e-13,
             args=(torque,),
             dense_output=True,
-        )
-        at = found.sol
-        assert at is not None
-        grid = np.linspace(now, until, max(int(48 * (until - now) / turn), 4) + 1)
-        values = [behind(at(t)) for t in grid]
-        roots = [
-            brentq(lambda t: behind(at(t)), *edge, xtol=1e-13)
-            for edge, pair in zip(itertools.pairwise(grid), itertools.pairwise(values), strict=True)
-            if pair[0] * pair[1] < 0.0 and before(at(edge[0]))
-        ]
+        ).sol
+
+    def move(until: float, torque: Array, *, stops: bool = False) -> list[float]:
+        """Sun pulses on the way; ``state`` and ``now`` go on, or to the first (``stops``)."""
+        nonlocal state, now
+        at = integrated(until, torque)
+        roots = passages(at, until, mark)
         stop = next((root for root in roots if root > last + 0.3 * turn), until) if stops else until
         state = at(stop)
         now = stop
-        roots = [root for root in roots if root <= stop]
-        return [float(root) for root in roots]
+        return [root for root in roots if root <= stop]
 
     none = np.zeros(3)
-    due = {}
-    for block in blocks:
-        due.update({block.first + k * block.every: block for k in range(block.count)})
+    due = [
+        (block.first + k * block.every, block.angle, block.delay, block)
+        for block in blocks
+        for k in range(block.count)
+    ]
+    due.sort(key=lambda each: each[:3])
     while due:
-        for root in move(now + 0.05 * turn, none, stops=True) if min(due) > passed else []:
+        for root in move(now + 0.05 * turn, none, stops=True) if due[0][0] > passed else []:
             if root > last + 0.3 * turn:
                 passed = passed + 1
                 last = root
-        if passed >= min(due):
-            block = due.pop(min(due))
-            starts.append(last + block.delay)
+        if passed >= due[0][0]:
+            _, angle, _, block = due.pop(0)
+            since = last
+            if angle:
+                at = integrated(now + 1.1 * turn, none)
+                since = passages(at, now + 1.1 * turn, mark - math.copysign(angle, body.spin))[0]
+            starts.append(since + block.delay)
             seen = move(starts[-1], none) if starts[-1] > now else []
             assert now <= starts[-1] + 1e-12
             seen += move(starts[-1] + block.width, torques[block.channel])

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support import places
 from support.builders import Outcome, present
 from support.commands import result
 from support.commands import rows as rows_of
@@ -329,6 +330,7 @@ def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(
             HEAD + "T1,1,1,0.1,100000\n",
             COUNTS + "T1,3,-4,0,4\nT1,9,2.5,3,4\n",
             "channel,delay\nT1,1\n",
+            HEAD + "T1,4,1,0.1,10\nT1,8,1.06,0.1,2\nT1,1,0.95,0.1,5\n",
         ),
     )
     assert [block.count for block in blocks(HEAD + "T1,1,1,0.1,5000\n")[0]] == [5000]
@@ -337,6 +339,31 @@ def test_all_faults_of_a_file_are_listed_and_what_cannot_be_commanded_is_named(
         "files.blocks-warned",
         "\n".join(blocks(every + "T1,3,4.899,0.153,4,3\nT1,20,1.001,0.1,300,1\n")[1]),
     )
+    by_angle = replace(CRAFT, commands=replace(present(CRAFT.commands), delay_is="angle"))
+    interleaved = HEAD + "T1,3,1,0.1,9\nT1,4,2,0.1,4\nT1,5,3,0.1,4\n"
+    check_text("files.blocks-interleaved", "\n".join(blocks(interleaved, by_angle)[1]))
+
+
+def test_two_blocks_a_turn_are_written_as_they_are_fired(run: Run, tmp_path: Path) -> None:
+    """Half a turn of the Sun apart, and a block behind them; --schedule reads blocks too."""
+    changed = ("state.nutation=1deg", "commands.per_turn=2", "commands.delay_is=angle")
+    options = ("--spin", "20rpm", *(word for value in changed for word in ("--set", value)))
+    source = str(places.case("two-pulses-a-turn.yaml"))
+    scheme = ("--scheme", "command-block")
+    planned = run("plan", source, *options, *scheme, *BLOCKS, "--csv", "pulses.csv", status=0)
+    assert "FLY" in planned.stdout
+    rows = rows_of((tmp_path / "blocks.csv").read_text())
+    before, after = rows[-2:]
+    assert before["first_sun_pulse"] == after["first_sun_pulse"]
+    assert float(after["delay_deg"]) - float(before["delay_deg"]) == pytest.approx(180.0, abs=0.05)
+    assert len(rows) > 2
+    starts = [float(pulse["start_s"]) for pulse in rows_of((tmp_path / "pulses.csv").read_text())]
+    for option in ("--blocks", "--schedule"):
+        output = (option, "blocks.csv", "--json", "-", "--samples", "2")
+        flown = run("simulate", source, *options, *output, status=0)
+        again = json.loads(flown.stdout)
+        assert [pulse["start_s"] for pulse in again["pulses"]] == pytest.approx(starts, abs=1e-6)
+        assert flown.stderr == ""
 
 
 def test_a_single_flight_has_no_jitter_of_the_sun_pulses(run: Run, blocks: ReadBlocks) -> None:

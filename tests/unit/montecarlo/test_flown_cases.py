@@ -331,6 +331,7 @@ BLOCKS = {
     "spin reversed": by_blocks(),
     "spin": by_blocks(spin=1.3),
     "three moments": by_blocks(spin=2.0, moments=(110.0, 98.0, 150.0)),
+    "interleaved": by_blocks(interleaved=True),
     "a wheel": dispersed.wheeled(by_blocks(spin=1.3), 60.0),
     "disturbances": by_blocks(disturbances=(Disturbance(0.02 + 0.01j, 0.03), LEAKS[1])),
     "tensors": dispersed.tensors(by_blocks(spin=1.3)),
@@ -392,10 +393,12 @@ def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyP
     assert outputs(RealWidths, model, draws) == pytest.approx(at_once, abs=1e-12, nan_ok=True)
 
 
-@pytest.mark.parametrize("number", [deep(0), deep(3)])
-def test_blocks_begin_as_the_reference_has_it(number: int) -> None:
+@pytest.mark.parametrize(
+    ("name", "number"), [deep("spin reversed", 0), deep("spin reversed", 3), ("interleaved", 2)]
+)
+def test_blocks_begin_as_the_reference_has_it(name: str, number: int) -> None:
     """Euler's equations by DOP853, Sun pulses as their roots."""
-    model = BLOCKS["spin reversed"]
+    model = BLOCKS[name]
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 4)
     true, _ = realised(model, dispersed.one_of(draws, number))
     _, starts = flown_by_reference(true, model.schedule.blocks)
@@ -422,6 +425,10 @@ def test_errors_of_timing_and_of_the_attitude_are_those_of_the_case() -> None:
     late = one["timing offset"] + one["timing pulse 1"] + one["Sun pulse 1"]
     first = fired(replace(true, sun_sensor=SunSensor(0.4)), model.schedule.blocks[:1]).pulses[0]
     assert own.starts[0][5] == pytest.approx(first.start + late, abs=1e-9)
+    # Pulses of one Sun pulse are late together.
+    names = by_blocks(sun_sensor=SunSensor(0.4, jitter=2e-3), interleaved=True).inputs.drawn
+    jitters = [entry.name for entry in names if entry.name.startswith("Sun pulse")]
+    assert len(jitters) == 8
 
 
 def test_an_error_of_the_spin_turns_no_heading() -> None:

@@ -22,6 +22,7 @@ from nutdamp import load
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import read_spacecraft
+from nutdamp.files.schedules import read_blocks
 from nutdamp.flight import propagation
 from nutdamp.flight.cones import aspects
 from nutdamp.flight.dynamics import Supply
@@ -153,6 +154,79 @@ def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: in
     )
     nutation = reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin))
     assert nutation == pytest.approx(float(present(plan.left).nutation), abs=near)
+
+
+THEMIS = load(places.case("two-pulses-a-turn.yaml"))
+TWO_A_TURN, _ = read_blocks(places.case("two-pulses-a-turn.csv"), THEMIS)
+IN_STEP = replace(
+    THEMIS,
+    commands=replace(present(THEMIS.commands), per_turn=2, delay_is="angle"),
+    goal=Goal(spin=20.0 * math.pi / 30.0),
+)
+
+
+def test_two_blocks_a_turn_stay_opposite_as_the_reference_has_it() -> None:
+    """A spin-up of THEMIS; by a fixed time, half a turn at the start, H turns 30 times as far."""
+    late = (TWO_A_TURN[0], replace(TWO_A_TURN[1], angle=0.0, delay=1.875))
+    for blocks, turned in ((TWO_A_TURN, 0.0283), (late, 0.8707)):
+        made = fired(THEMIS, blocks)
+        motion, starts = flown_by_reference(THEMIS, blocks)
+        assert [one.start for one in made] == pytest.approx(starts, abs=1e-7)
+        moments = THEMIS.inertia.moments
+        momentum = reference.momentum(moments, motion)
+        end = left_by(propagation.flown(THEMIS, made))
+        assert math.degrees(end.aim) == pytest.approx(turned, abs=1e-4)
+        assert reference.angle(momentum, THEMIS.momentum) == pytest.approx(end.aim, abs=1e-7)
+        assert reference.nutation(moments, motion.rates, 1.0) == pytest.approx(
+            end.nutation, abs=1e-7
+        )
+        assert motion.rates[2] * 30.0 / math.pi == pytest.approx(20.0, abs=1e-3)
+    assert math.degrees(left_by(propagation.flown(THEMIS, fired(THEMIS, TWO_A_TURN))).nutation) == (
+        pytest.approx(0.5603, abs=1e-4)
+    )
+
+
+def test_interleaved_blocks_fire_as_one_of_half_their_spacing() -> None:
+    one = Block("T1", 2, 1.2, 0.3, 10, 1)
+    even, odd = replace(one, count=5, every=2), replace(one, first=3, count=5, every=2)
+    whole, parts = fired(THEMIS, (one,)), fired(THEMIS, (odd, even))
+    assert [pulse.t for pulse in parts] == [pulse.t for pulse in whole]
+    assert parts.pulses_by_block == [[1, 3, 5, 7, 9], [0, 2, 4, 6, 8]]
+
+
+@pytest.mark.parametrize(
+    ("angle", "text"),
+    [(0.5, "block 2, Sun pulse 1: "), (5.9, "block 1, Sun pulse 2: ")],
+    ids=["the same Sun pulse", "the next one"],
+)
+def test_pulses_that_would_overlap_are_refused_by_block_and_sun_pulse(
+    angle: float, text: str
+) -> None:
+    with pytest.raises(Infeasible, match=f"{text}.*give them delays or Sun pulses farther apart"):
+        fired(THEMIS, (TWO_A_TURN[0], replace(TWO_A_TURN[1], angle=angle)))
+
+
+def test_opposite_blocks_set_the_spin_where_sequences_turn_h_too_far() -> None:
+    """Two blocks, of as many pulses as leave no nutation."""
+    plan = planned(IN_STEP)
+    before, after = plan.pulses.blocks
+    assert math.degrees(after.angle - before.angle) == pytest.approx(180.0, abs=0.05)
+    assert replace(after, angle=before.angle) == before
+    assert plan.pulses.cost < 1.01 * fired(THEMIS, TWO_A_TURN).cost
+    assert codes(plan.pulses.notes) == ["blocks-opposite"]
+    alone = replace(IN_STEP, commands=THEMIS.commands)
+    assert not planned(alone, met=False).meets_requirement
+    assert "--per-turn 1 or 2" in str(
+        infeasibility(planning.plan(IN_STEP, "command-block", Options(per_turn=3)))
+    )
+
+
+def test_a_further_block_damps_what_opposite_ones_leave() -> None:
+    """With the one width of the flown ones, which leave 0.56 deg of nutation."""
+    commands = replace(present(IN_STEP.commands), widths=np.array([0.357]), width_step=None)
+    plan = planned(replace(IN_STEP, commands=commands))
+    assert plan.pulses.blocks[:2] == TWO_A_TURN
+    assert len(plan.pulses.blocks) > 2
 
 
 @pytest.mark.parametrize("seed", [26, 52])
