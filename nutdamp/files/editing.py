@@ -418,12 +418,12 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     turned = after.attitude
     if turned is None:
         return
+    of = tree.get("attitude", "of")
+    vector = None if of is None else str(of.value)
     if tree.get("attitude", "spin_axis") is None:
         keys = {"quaternion": flow_list(turned.quaternion)}
     else:
-        vector = tree.get("attitude", "of")
-        of_momentum = vector is not None and vector.value == "momentum"
-        axis = attitude.unit(after.momentum) if of_momentum else after.axis
+        axis = attitude.unit(after.momentum) if vector == "momentum" else after.axis
         first = attitude.rotate(turned.quaternion, np.array([1.0, 0.0, 0.0]))
         places: dict[KeyPath, float] = {
             ("spin_axis", 0): attitude.full_turn(math.atan2(axis[1], axis[0])),
@@ -434,15 +434,13 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
             as_before(tree.get("attitude", *path), angle, "angle") for path, angle in places.items()
         )
         keys = {"spin_axis": f"[{ascension}, {declination}]", "phase": phase}
-        if of_momentum:
-            keys["of"] = "momentum"
     for key in ("epoch", "frame"):
         value = getattr(turned, key)
         if value is not None and (old is None or value != getattr(old, key)):
             keys[key] = value
     # No attitude before, or from the side of the Sun, which may be elsewhere by now.
     if tree.get("attitude") is None or tree.get("attitude", "sun_phase") is not None:
-        whole = keys | {key: getattr(turned, key) for key in ("epoch", "frame")}
+        whole = keys | {"of": vector, "epoch": turned.epoch, "frame": turned.frame}
         entries = ", ".join(f"{key}: {value}" for key, value in whole.items() if value)
         yield Edit(("attitude",), f"{{{entries}}}")
         return
@@ -484,10 +482,9 @@ def as_before(node: Node | None, value: float, kind: str) -> str:
     if before is not None and not isinstance(before, str):
         return number(value)
     suffix = re.search(r"[^\d.eE+\s-].*$", (before or "").strip())
-    unit = "deg" if kind == "angle" else KINDS[kind].si
-    if suffix is not None:
-        with suppress(ValueError):  # hours, minutes and seconds are no unit
-            return f"{number(value / parse(f'1 {suffix.group()}', kind))} {suffix.group()}"
+    unit = suffix.group() if suffix else "deg" if kind == "angle" else KINDS[kind].si
+    if kind == "angle" and re.search(r"\d", unit):  # hours, minutes and seconds in one text
+        unit = "deg"
     return f"{number(value / parse(f'1 {unit}', kind))} {unit}"
 
 

@@ -817,7 +817,13 @@ def test_at_a_pole_the_phase_counts_from_x(dec: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "of", ["phase: 20 deg", "phase: 20 deg, of: momentum", "sun_phase: 20 deg"]
+    "of",
+    [
+        "phase: 20 deg",
+        "phase: 20 deg, of: momentum",
+        "sun_phase: 20 deg",
+        "sun_phase: 20 deg, of: momentum",
+    ],
 )
 @pytest.mark.parametrize("inertia", [SYMMETRIC, TENSOR])
 @pytest.mark.parametrize("spin", [3.0, -3.0])
