@@ -18,7 +18,7 @@ from nutdamp.common import work
 from nutdamp.control_loop.law import Actuator, ComplexArray, Firing, Law
 from nutdamp.control_loop.sensor import Doubt, Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
-from nutdamp.flight.dynamics import Dynamics, Joined, Path, Supply, shed, weakened
+from nutdamp.flight.dynamics import Dynamics, Path, Supply, joined, shed, weakened
 from nutdamp.physics.motion import MOST_STEPS
 from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
@@ -202,9 +202,9 @@ class Coast(Watch):
     def _motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) rad/s and quaternions (n, 4) at ``times`` (n,) s that the path reaches."""
         begins, path = self.parts[-1]
-        return (path if self.dynamics.free or times[0] >= begins else Joined(self.parts)).motion(
-            times
-        )
+        if self.dynamics.free or times[0] >= begins:
+            return path.motion(times)
+        return joined([(start, part.motion) for start, part in self.parts], times)
 
     def at(self, time: float) -> SpinState:
         """State at ``time`` s, which has been seen or lies within a nutation period after that."""

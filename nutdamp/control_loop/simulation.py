@@ -119,9 +119,9 @@ class LoopRun:
         """Motion at the ``end`` of a coast that began as ``state``; where it was integrated to be
         seen, as it was.
         """
-        path: Path = Joined(coast.parts)
         if coast.parts and not self.dynamics.free:
             arrived = coast.at(end)
+            path: Path = Joined([(begin, part.motion) for begin, part in coast.parts])
         else:
             path, arrived = self.dynamics.path(state, start, end, most=MOST_STEPS)
         self._leg(start, end, path)

@@ -15,7 +15,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.physics import motion
 from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Torque, driven_by
+from nutdamp.physics.series import Bodies, Falling, Forcing, Torque, driven_by
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
     BLOWDOWN,
@@ -73,16 +73,12 @@ def joined(
 class Joined:
     """Path of ``parts`` one after the other, each from the time (s) beside it on."""
 
-    parts: Sequence[tuple[float, Path]]
-
-    @property
-    def steps(self) -> int:
-        """Steps of integration."""
-        return sum(path.steps for _, path in self.parts)
+    parts: Sequence[tuple[float, Callable[[Vector], tuple[Vector, Vector]]]]
+    steps: int = 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        return joined([(start, path.motion) for start, path in self.parts], times)
+        return joined(self.parts, times)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,24 +138,6 @@ class FreeCoast:
         rates = self.state.rates
         turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
         return triaxial.free_rates(self.moments, rates, since), turned
-
-
-@dataclass(frozen=True, slots=True)
-class Integrated:
-    """Motion under a constant torque, or of a body with three different moments,
-    as Taylor series.
-    """
-
-    pieces: tuple[Polynomial, ...]
-
-    @property
-    def steps(self) -> int:
-        """Steps of integration."""
-        return len(self.pieces)
-
-    def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        return joined([(piece.start, piece.motion) for piece in self.pieces], times)
 
 
 LONG = 20.0
@@ -248,46 +226,60 @@ class Dynamics:
         work.spend(LEG)
         torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
-            arc = self._arc(start, state)
+            _, growth, wheel, sense, _ = self.forcing
+            arc = Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
             return arc, state if end == start else arc.end(end)
-        bodies = Bodies(np.array(self.moments), self.constant, self.forcing)
-        torque = np.sum(torques, axis=0) if torques else None
-        quaternion = state.quaternion.copy()
-        stretch = MotionStretch(bodies, start, state.rates, quaternion, torque, slope, falling)
-        parts = list[tuple[float, Path]]()
-        for part, length in motion.between_edges(stretch, end - start):
-            path, state = self._alike(part, state, length, most)
-            most -= path.steps
-            parts.append((float(part.since), path))
-            stretch.rates[:] = state.rates
-            quaternion[:] = state.quaternion
-        return parts[0][1] if len(parts) == 1 else Joined(parts), state
-
-    def _arc(self, start: float, state: SpinState) -> Arc:
-        _, growth, wheel, sense, _ = self.forcing
-        return Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
-
-    def _alike(
-        self, here: MotionStretch, state: SpinState, length: float, most: int
-    ) -> tuple[Path, SpinState]:
-        """Motion ``here`` under the same torques for ``length`` s, from ``state``."""
-        bodies = here.bodies
-        pushed = here.slope is not None or (here.torque is not None and bool(here.torque.any()))
-        start = float(here.since)
-        if not pushed and here.falling is None:
-            if bodies.free and here.torque is None:
-                arc = self._arc(start, state)
-                return arc, arc.end(start + length)
-            long = float(np.linalg.norm(state.rates)) * length > LONG
-            if long and not bodies.constant.any() and bodies.forcing == Forcing():
-                coast = FreeCoast(self.moments, start, state)
-                (rates,), (quaternion,) = coast.motion(np.array([start + length]))
-                work.spend(PULSE)
-                return coast, SpinState.of(rates, quaternion)
-        pieces = tuple(motion.polynomials(here, length, most))
+        torque = np.asarray(sum(torques, np.zeros(3)))
+        long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
+        if (
+            long
+            and falling is None
+            and slope is None
+            and not torque.any()
+            and not self.constant.any()
+            and self.forcing == Forcing()
+        ):
+            coast = FreeCoast(self.moments, start, state)
+            (rates,), (quaternion,) = coast.motion(np.array([end]))
+            work.spend(PULSE)
+            return coast, SpinState.of(rates, quaternion)
+        stretch = MotionStretch(
+            Bodies(np.array(self.moments), self.constant, self.forcing),
+            start,
+            state.rates,
+            state.quaternion.copy(),
+            torque,
+            slope,
+            falling,
+        )
+        if self.forcing.timed:
+            return self._between_edges(stretch, state, end, push, most)
+        pieces = tuple(motion.polynomials(stretch, end - start, most))
         step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
         work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
-        return Integrated(pieces), SpinState.of(*pieces[-1].end())
+        path = Joined([(piece.start, piece.motion) for piece in pieces], len(pieces))
+        return path, SpinState.of(*pieces[-1].end())
+
+    def _between_edges(
+        self, stretch: MotionStretch, state: SpinState, end: float, push: Push, most: int
+    ) -> tuple[Path, SpinState]:
+        """Path of a ``stretch`` to ``end`` s, each part under the same torques as of a body of its
+        own.
+        """
+        parts = list[tuple[float, Path]]()
+        for part, length in motion.between_edges(stretch, end - stretch.since):
+            bodies, start = part.bodies, float(part.since)
+            plain = replace(self, constant=bodies.constant, forcing=bodies.forcing)
+            torques = [part.torque] if push.torques and part.torque is not None else []
+            pushed = Push(torques, part.slope, part.falling)
+            body = plain.with_moments(bodies.moments)
+            path, state = body._path(state, start, start + length, pushed, most)
+            most -= path.steps
+            parts.append((start, path))
+            stretch.rates[:] = state.rates
+            stretch.quaternion[:] = state.quaternion
+        steps = sum(path.steps for _, path in parts)
+        return Joined([(start, path.motion) for start, path in parts], steps), state
 
     def command(self, pulse: Pulse) -> None:
         """Take note of a pulse before it is flown:

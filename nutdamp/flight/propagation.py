@@ -369,7 +369,7 @@ def _effective_impulse(
     """Effect of ``pulse`` on ω at its centre, N m s, with the ``inertia`` and ω3 (rad/s)
     before it.
     """
-    drift = spacecraft.spin_drift(pulse.t)
+    drift = spacecraft.spin_drift(*pulse.thrust)
     impulse = complex(pulse.impulse[0], pulse.impulse[1])
     axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
     slope = inertia.nutation_slope(spin)

@@ -113,9 +113,9 @@ def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
     return added(turned, (first * along, second * along, 0.0))
 
 
-def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
-    """Matrix times vector, elementwise over cases."""
-    return triple(reduce(plus, map(times, row, vector)) for row in matrix.tolist())
+def turned(matrix: Any, vector: Sequence[Cases]) -> Triple:
+    """Matrix (3, 3), or (3, 3, n), times vector, elementwise over cases."""
+    return triple(reduce(plus, map(times, row, vector)) for row in matrix)
 
 
 def tank_of(spacecraft: Spacecraft, draws: Draws) -> Tank | None:
@@ -226,7 +226,7 @@ class DispersedCases:
 
     def of_estimate(self, vector: Triple) -> Triple:
         """A vector in the principal axes of the estimate from the cases' own."""
-        return vector if self.turn is None else _rows_times(self.turn, vector)
+        return vector if self.turn is None else turned(self.turn, vector)
 
     def untwisted(self, vector: Triple) -> Triple:
         """A vector in the cases' own axes, turned about the third to where the first is nearest to
@@ -362,7 +362,7 @@ class DispersedModel:
 
         def own(vector: Triple) -> Triple:
             """In the principal axes of the cases."""
-            return vector if turn is None else _rows_times(np.swapaxes(turn, 0, 1), vector)
+            return vector if turn is None else turned(np.swapaxes(turn, 0, 1), vector)
 
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
         torques = {
@@ -571,16 +571,15 @@ def principal(tensor: Vector, change: NDArray[Any]) -> tuple[NDArray[Any], NDArr
     An imaginary part is a change to first order; of equal moments it turns no axis.
     """
     values, vectors = np.linalg.eigh(tensor + change.real)
-    rows = np.arange(len(values))
     nearness = np.abs(vectors)
     third = np.argmax(nearness[:, 2], axis=1)
-    nearness[rows, 0, third] = -1.0
+    nearness[np.arange(len(values)), 0, third] = -1.0
     first = np.argmax(nearness[:, 0], axis=1)
-    values = np.stack([values[rows, each] for each in (first, 3 - first - third, third)], axis=1)
-    along, last = vectors[rows, :, first], vectors[rows, :, third]
-    along = along * np.where(along[:, :1] < 0.0, -1.0, 1.0)
-    last = last * np.where(last[:, 2:] < 0.0, -1.0, 1.0)
-    turn = np.stack([along, np.cross(last, along), last], axis=2)
+    order = np.stack([first, 3 - first - third, third], axis=1)
+    values = np.take_along_axis(values, order, axis=1)
+    turn = np.take_along_axis(vectors, order[:, None, :], axis=2)
+    turn *= np.where(np.diagonal(turn, axis1=1, axis2=2) < 0.0, -1.0, 1.0)[:, None, :]
+    turn[:, :, 1] = np.cross(turn[:, :, 2], turn[:, :, 0])
     if not np.iscomplexobj(change):
         return values, turn
     slight = np.swapaxes(turn, 1, 2) @ change.imag @ turn
@@ -588,11 +587,6 @@ def principal(tensor: Vector, change: NDArray[Any]) -> tuple[NDArray[Any], NDArr
     equal = np.abs(apart) <= DEGENERATE * values.max(axis=1)[:, None, None]
     lean = slight / np.where(equal, np.inf, apart)
     return values + 1j * np.diagonal(slight, axis1=1, axis2=2), turn + 1j * turn @ lean
-
-
-def _rows_times(matrix: Any, vector: Sequence[Cases]) -> Triple:
-    """Matrices (3, 3, n) times vectors, elementwise over cases."""
-    return triple(reduce(plus, map(times, row, vector)) for row in matrix)
 
 
 def watch_over(
@@ -621,7 +615,7 @@ def in_body(
     """
     x, y, z = attitude.rotate(attitude.conjugate(spacecraft.initial.quaternion), direction).tolist()
     seen = rotated((x, y, z), (-tilt[0], -tilt[1]))
-    own = seen if turn is None else _rows_times(np.swapaxes(turn, 0, 1), seen)
+    own = seen if turn is None else turned(np.swapaxes(turn, 0, 1), seen)
     return np.array([np.broadcast_to(part, count) for part in own])
 
 

@@ -170,9 +170,6 @@ def between_edges(here: MotionStretch, duration: Any) -> Iterator[tuple[MotionSt
 
     All hold the arrays of ``here``: move these on before the next part is taken.
     """
-    if not here.bodies.forcing.timed:
-        yield here, duration
-        return
     start, goal = here.since, here.since + duration
     spans = list(pairwise([-math.inf, *here.bodies.forcing.edges, math.inf]))
     for ordered, onward in ((spans, np.maximum), (spans[::-1], np.minimum)):
@@ -189,12 +186,10 @@ def advance(here: MotionStretch, duration: Any) -> None:
     """Propagate rates and quaternions by ``duration`` (n,) s, in place."""
     if not np.any(duration):
         return
-    for part, length in between_edges(here, duration):
-        _advance(part, length)
-
-
-def _advance(here: MotionStretch, duration: Any) -> None:
-    """`advance` under the same torques."""
+    if here.bodies.forcing.timed:
+        for part, length in between_edges(here, duration):
+            advance(part, length)
+        return
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     if here.torque is None and bodies.free and here.falling is None:
         A, _, C = bodies.moments

@@ -175,9 +175,11 @@ def _stated(
     for name in names:
         for entry in study.model.inputs.drawn:
             if entry.tolerance == name and entry.kind != "bias":
-                sizes.setdefault(
-                    (name, entry.kind, entry.size), (entry, _relative(getattr(given, name), entry))
-                )
+                # The first entry of a tensor, a diagonal one, stands for the share of them all.
+                size = 0.0 if name == "inertia_tensor" else entry.size
+                stated = entry._replace(name=name) if size == 0.0 else entry
+                relative = _relative(getattr(given, name), entry)
+                sizes.setdefault((name, entry.kind, size), (stated, relative))
     return tuple(sizes.values())
 
 

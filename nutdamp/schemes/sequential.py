@@ -111,9 +111,9 @@ class ImpulseBuilder:
             angle = self.a * equivalent * effect.travel - slower * since
             omega = omega * effect.transverse
             spin = equivalent * effect.along - slower
-        gained, turned = self.spacecraft.drifted(self.now, time)
-        angle += self.a * turned
-        return omega * cmath.exp(-1j * angle), spin + gained
+        drift = self.spacecraft.spin_drift(self.now, time)
+        angle += 0.5 * self.a * drift * since * since
+        return omega * cmath.exp(-1j * angle), spin + drift * since
 
     def _sink(self) -> tuple[float, float, float]:
         """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
@@ -145,7 +145,7 @@ class ImpulseBuilder:
         rate = self.rate(spin)
         slope = self.a * axial / self.C
         growth = self.spacecraft.growth
-        drift = self.a * self.spacecraft.spin_drift(pulse.t)
+        drift = self.a * self.spacecraft.spin_drift(*pulse.thrust)
         factor = response.width_factor(rate, slope, pulse.on_time, growth, drift)
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 

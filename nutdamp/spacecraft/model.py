@@ -283,12 +283,10 @@ class Disturbance:
     begin: float = 0.0
     end: float = math.inf
 
-    def within(self, start: float, end: Any) -> tuple[Any, Any]:
-        """Time, s, from which it acts between ``start`` and ``end`` s, (n,) or one, and for how
-        long.
-        """
+    def within(self, start: float, end: float) -> tuple[float, float]:
+        """Time, s, from which it acts between ``start`` and ``end`` s, and for how long."""
         begin = max(start, self.begin)
-        return begin, np.maximum(np.minimum(end, self.end) - begin, 0.0)
+        return begin, max(min(end, self.end) - begin, 0.0)
 
     def after(self, time: float) -> Disturbance:
         """The same, where times count from ``time`` s."""
@@ -506,23 +504,13 @@ class Spacecraft(results.Data, results.Shown):
         size = float(np.linalg.norm(self.momentum))
         return energy_sink.damper(inertia.A, inertia.C, self.sense * inertia.wheel, size, 1.0)
 
-    def spin_drift(self, time: float) -> float:
-        """Spin acceleration by the axial disturbances at ``time`` s, rad/s²."""
-        acting = (each for each in self.disturbances if each.begin <= time < each.end)
-        return math.fsum(each.axial for each in acting) / self.inertia.C
-
-    def drifted(self, start: float, end: Any) -> tuple[Any, Any]:
-        """Spin (rad/s) that the axial disturbances add from ``start`` to ``end`` s, and the turn
-        (rad) that this adds.
+    def spin_drift(self, start: float, end: float) -> float:
+        """Mean spin acceleration by the axial disturbances from ``start`` to ``end`` s, rad/s²; 0
+        of no time.
         """
-        gained: Any = 0.0
-        turned: Any = 0.0
-        for disturbance in self.disturbances:
-            begin, lasts = disturbance.within(start, end)
-            more = disturbance.axial / self.inertia.C * lasts
-            gained = gained + more
-            turned = turned + more * (end - begin - 0.5 * lasts)
-        return gained, turned
+        first, last = min(start, end), max(start, end)
+        axial = (each.axial * each.within(first, last)[1] for each in self.disturbances)
+        return math.fsum(axial) / (self.inertia.C * (last - first)) if last > first else 0.0
 
     @property
     def edges(self) -> list[float]:

@@ -243,7 +243,7 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
     0.
     """
     spacecraft, schedule = flight.spacecraft, flight.schedule
-    inertia = spacecraft.inertia
+    inertia, drift = spacecraft.inertia, spacecraft.spin_drift(0.0, schedule.end)
     slope, offset = inertia.linear_rate(spacecraft.spin)
     if (
         spacecraft.growth != 0.0
@@ -257,7 +257,7 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
         )
         phase = slope * np.interp(times, knots, turned) + offset * times
         return np.asarray(np.exp(1j * phase + grown) * then / now)
-    turned = spacecraft.spin * times + spacecraft.drifted(0.0, times)[1]
+    turned = (spacecraft.spin + 0.5 * drift * times) * times
     for pulse in (
         schedule if inertia.symmetric else ()
     ):  # changes of three moments are followed, see `_variations`

@@ -417,7 +417,7 @@ def test_what_the_example_shows_in_comments_works() -> None:
     assert (craft.limits.horizon, craft.limits.blackout) == (120.0, ((10.0, 20.0),))
     rates = {disturbance.name: disturbance.rate for disturbance in craft.disturbances}
     assert rates == {"leak": 0.0, "pump": -3.0, "sunlight": -craft.spin, "drag": 0.0, "burn": 0.0}
-    assert (craft.spin_drift(20.0), craft.dissipation) == (-0.001 / 80, 600.0)
+    assert (craft.spin_drift(10.0, 20.0), craft.dissipation) == (-0.001 / 80, 600.0)
     thrusters = ["+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"]
     assert [*present(craft.dispersions).thrust] == thrusters
     assert present(craft.dispersions).timing_offset == Tolerance("bias", 0.002)
