@@ -416,7 +416,7 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
     if turned is None:
         return
     if old is not None:  # the other directions of the file stay in its frame
-        turned = turned.seen_in(old.frame)
+        turned = replace(turned, epoch=old.epoch).seen_in(old.frame, turned.epoch)
     parts = flow_list(turned.quaternion)
     keys = {"quaternion": parts, "epoch": turned.epoch, "frame": turned.frame}
     if (
