@@ -275,7 +275,7 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm
     also mass, and orbit for its state. Vectors are in the axes of that file, those of opm in
-    attitude.frame.
+    attitude.frame. A frame of the ecliptic or of date is turned into EME2000.
     """
     from nutdamp.api import export
     from nutdamp.views.verdict import stated

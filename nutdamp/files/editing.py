@@ -413,17 +413,19 @@ def epoch_after(epoch: str, time: float) -> str:
 def attitude_edits(tree: Node, later: Later) -> Edits:
     """Attitude, epoch and frame; nothing for a body without attitude."""
     after, old = later.after, later.before.attitude
-    if old is not None and old.frame is not None:  # the other directions of the file stay in it
-        after = after.seen_in(old.frame)
-    turned = after.attitude
-    if turned is None:
+    turned = start = after.attitude
+    if turned is None or start is None:
         return
+    if old is not None:  # the other directions of the file stay in its frame
+        start = replace(start, epoch=old.epoch)
+        turned = start.seen_in(old.frame, turned.epoch)
     of = tree.get("attitude", "of")
     vector = None if of is None else str(of.value)
     if tree.get("attitude", "spin_axis") is None:
         keys = {"quaternion": flow_list(turned.quaternion)}
     else:
         axis = attitude.unit(after.momentum) if vector == "momentum" else after.axis
+        axis = turned.axes.T @ start.axes @ axis
         first = attitude.rotate(turned.quaternion, np.array([1.0, 0.0, 0.0]))
         places: dict[KeyPath, float] = {
             ("spin_axis", 0): attitude.full_turn(math.atan2(axis[1], axis[0])),
@@ -482,9 +484,10 @@ def as_before(node: Node | None, value: float, kind: str) -> str:
     if before is not None and not isinstance(before, str):
         return number(value)
     suffix = re.search(r"[^\d.eE+\s-].*$", (before or "").strip())
-    unit = suffix.group() if suffix else "deg" if kind == "angle" else KINDS[kind].si
-    if kind == "angle" and re.search(r"\d", unit):  # hours, minutes and seconds in one text
-        unit = "deg"
+    unit = "deg" if kind == "angle" else KINDS[kind].si
+    if suffix is not None:
+        with suppress(ValueError):  # hours, minutes and seconds are no unit
+            return f"{number(value / parse(f'1 {suffix.group()}', kind))} {suffix.group()}"
     return f"{number(value / parse(f'1 {unit}', kind))} {unit}"
 
 

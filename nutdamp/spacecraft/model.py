@@ -325,11 +325,14 @@ class Attitude:
 
         return attitude.frame_axes(self.frame, Epoch.parse(self.epoch).days_of_j2000)
 
-    def seen_in(self, frame: str | None) -> Attitude:
-        """The same attitude in another frame; as it is where one of them has no name."""
-        if frame is None or self.frame in (None, frame):
-            return self
-        other = replace(self, frame=frame)
+    def seen_in(self, frame: str | None, epoch: str | None = None) -> Attitude:
+        """The same attitude in another frame, of the date of an ``epoch``, which is then the new
+        one; not turned where a frame has no name.
+        """
+        other = replace(self, epoch=epoch or self.epoch)
+        if frame is None or self.frame is None:
+            return other
+        other = replace(other, frame=frame)
         turn = attitude.from_matrix(other.axes.T @ self.axes)
         return replace(other, quaternion=attitude.multiply(turn, self.quaternion))
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,12 @@ import nutdamp
 from nutdamp.common.time import Epoch
 from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.ccsds.write import merge
+from nutdamp.files.editing import as_before
 from nutdamp.files.reader import Source, source_of
 from nutdamp.files.telemetry import record_of
+from nutdamp.files.yaml import read_tree
 from nutdamp.physics import attitude
+from nutdamp.spacecraft.model import SpinState
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.decisions import plan_json
 from nutdamp.views.simulation import simulation_json
@@ -128,17 +132,32 @@ def test_exports_are_those_of_eme2000(
     assert NUMBER.sub("", texts[0]) == NUMBER.sub("", texts[1])
 
 
-def test_what_is_carried_on_and_merged_stays_in_the_frame(tmp_path: Path) -> None:
+def test_what_is_merged_stays_in_the_frame(tmp_path: Path) -> None:
     plan = planned("ECLIPDATE")
-    source = source_of(mission("ECLIPDATE"))
     nutdamp.export(planned("J2000"), "apm", tmp_path / "a.apm")
+    source = source_of(mission("ECLIPDATE"))
     merged, _, _ = merge(source, read_message(str(tmp_path / "a.apm")), inertia=False)
     after = Source(merged, "f.yaml").read()
     assert present(after.attitude).frame == "ECLIPDATE"
-    bodies = (plan.spacecraft.initial, after.initial)
-    turns = [np.outer(state.quaternion, state.quaternion) for state in bodies]
-    assert turns[1] == pytest.approx(turns[0], abs=SOLID)
-    assert present(plan.carried().attitude).frame == "ECLIPDATE"
+    assert turn(after) == pytest.approx(turn(plan.spacecraft), abs=SOLID)
+
+
+@pytest.mark.parametrize("frame", OTHER)
+def test_a_file_carried_on_is_in_the_frame_of_its_date(frame: str) -> None:
+    """The axes of date turn by 0.96 arcsec in a week."""
+    plan = nutdamp.plan(nutdamp.load(mission(frame)), "none")
+    time = 7.0 * 86400.0
+    after = plan.carried(time)
+    assert present(after.attitude).frame == frame
+    state = SpinState.of(*(part[0] for part in plan.reaching(time).motion(np.array([time]))))
+    end = replace(present(plan.spacecraft.attitude), quaternion=state.quaternion)
+    expected = end.axes @ attitude.matrix(end.quaternion)
+    seen = present(after.attitude).axes @ attitude.matrix(after.initial.quaternion)
+    assert seen == pytest.approx(expected, abs=1e-10)  # numbers of the file have 12 digits
+
+
+def turn(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
+    return attitude.matrix(spacecraft.initial.quaternion)
 
 
 def test_a_history_of_eme2000_is_telemetry_in_the_frame_of_the_file(tmp_path: Path) -> None:
@@ -157,3 +176,13 @@ def test_right_ascension_in_hours() -> None:
     spoken = nutdamp.load(keys)
     assert present(spoken.goal.axis) == pytest.approx(present(plain.goal.axis), abs=1e-15)
     assert present(spoken.keep[0].direction) == pytest.approx(present(plain.keep[0].direction))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("18h 12m 33s", "30 deg"), ("2 h", "30 deg"), ("60 arcmin", "1800 arcmin"), ("1 rad", None)],
+)
+def test_an_angle_is_written_in_the_unit_of_the_file(text: str, expected: str | None) -> None:
+    (node,) = (child for _, child in read_tree(f"phase: {text}", "f.yaml")[0].children())
+    value = math.radians(30.0)
+    assert as_before(node, value, "angle") == (expected or f"{value:.12g} rad")
