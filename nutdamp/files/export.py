@@ -99,8 +99,7 @@ AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
 """Inertial frames that the formats have a name for, and their names in that of the Systems Tool
 Kit.
 """
-FRAMES = tuple(AXES)
-FRAME_NAMES = {**{frame: frame for frame in FRAMES}, "ICRF": "GCRF"}
+FRAME_NAMES = {**{frame: frame for frame in AXES}, "ICRF": "GCRF"}
 """Frames of a spacecraft file by their names in messages."""
 
 MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
@@ -159,10 +158,9 @@ def reference(spacecraft: Spacecraft) -> Reference:
         raise BadRequest(
             f"this format needs {names}, which the spacecraft file does not give; {cure}"
         )
-    if start.frame not in FRAMES:
+    if start.frame not in AXES:
         problem = (
-            f"{start.frame!r} is no frame that the format knows; "
-            f"expected one of {', '.join(FRAMES)}"
+            f"{start.frame!r} is no frame that the format knows; expected one of {', '.join(AXES)}"
         )
         raise Unsuitable(("attitude", "frame"), problem)
     return Reference(Epoch.parse(start.epoch), start.frame)
