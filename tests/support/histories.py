@@ -149,13 +149,13 @@ def moment(index: int) -> str:
 KINDS: dict[str, tuple[Callable[[Motion], list[float]], str]] = {
     "QUATERNION": (quaternion, ""),
     "QUATERNION/ANGVEL": (
-        lambda motion: [*quaternion(motion), *rates(motion)],
-        "ANGVEL_FRAME = SC_BODY_1\n",
+        lambda motion: [*quaternion(motion), *np.degrees(motion.rotation @ motion.rates)],
+        "ANGVEL_FRAME = J2000\n",
     ),
     "EULER_ANGLE": (lambda motion: turns(motion, "ZXZ"), "EULER_ROT_SEQ = ZXZ\n"),
     "EULER_ANGLE/ANGVEL": (
-        lambda motion: [*turns(motion, "XYZ"), *np.degrees(motion.rotation @ motion.rates)],
-        "EULER_ROT_SEQ = XYZ\nANGVEL_FRAME = J2000\n",
+        lambda motion: [*turns(motion, "XYZ"), *rates(motion)],
+        "EULER_ROT_SEQ = XYZ\nANGVEL_FRAME = SC_BODY_1\n",
     ),
     "SPIN": (lambda motion: [*spin(motion), rates(motion)[2]], ""),
     "SPIN/NUTATION": (nutating, ""),
