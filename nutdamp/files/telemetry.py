@@ -51,7 +51,7 @@ def record_of(history: Contents, spacecraft: Spacecraft, schedule: Schedule) -> 
         raise BadRequest(
             "the spacecraft file has no attitude.epoch to count the times of a history from"
         )
-    if start.frame is not None and AXES[start.frame] != AXES[history.frame]:
+    if start.frame is not None and AXES.get(start.frame) != AXES[history.frame]:
         raise BadRequest(
             f"the history is in {history.frame}, the spacecraft file in {start.frame}: "
             "expected one frame"

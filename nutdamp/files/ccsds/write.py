@@ -678,7 +678,7 @@ def merge(
         rates = rates if np.isnan(record.rates).any() else record.rates[0]
     after = replace(after, omega0=axes.T @ rates)
     if record is not contents and acute(record) > 0.0:
-        doubts = contradictions(record, after, "its spin and nutation, not the period")
+        doubts = contradictions(record, after, "spin and nutation of the message, not its period")
         first, second, third = after.inertia.momentum(after.omega0).tolist()
         share = abs(third) * math.tan(acute(record)) / math.hypot(first, second)
         after = replace(after, omega0=after.omega0 * (share, share, 1.0))

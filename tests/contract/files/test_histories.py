@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from support import histories, messages, reference
 from support.builders import present
 from support.cases import deep
-from support.contract import Write, check_faults
+from support.contract import Write, check_faults, slips
 from support.golden import check_text
 from support.histories import STEP
 from support.process import Run
@@ -264,6 +264,27 @@ def test_what_is_written_is_read_with_the_motion_that_it_is_of(
     merged = nutdamp.read(merge(other, contents, time, inertia=form == "apm")[0])
     assert merged.rates == pytest.approx(record.rates[0], abs=1e-9)
     assert reference.turned(columns, attitude.matrix(present(merged.attitude).quaternion)) < 1e-8
+
+
+@pytest.mark.deep
+@pytest.mark.parametrize(
+    "kind", ["QUATERNION/ANGVEL", "EULER_ANGLE", "SPIN/NUTATION", "ACM", "STK"]
+)
+@given(data=st.data())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_is_in_the_file_is_read_or_reported(
+    write: Write, kind: str, data: st.DataObject
+) -> None:
+    """Contents, or faults with lines; never anything else."""
+    lines = data.draw(slips(histories.history(kind, histories.flown(3))))
+    reported = [1]
+    try:
+        contents = read_message(str(write("".join(lines), "history.txt")))
+        assert len(contents.times) == len(contents.quaternions) == len(contents.rates)
+    except FaultyFile as wrong:
+        reported = [fault.line for fault in wrong.faults]
+    assert reported
+    assert min(reported) >= 1
 
 
 def test_remarks_name_what_is_not_read(write: Write) -> None:
