@@ -23,7 +23,7 @@ from support.process import Run
 import nutdamp
 from nutdamp.errors import BadRequest, FaultyFile
 from nutdamp.files.ccsds.read import read_message
-from nutdamp.files.ccsds.write import merge
+from nutdamp.files.ccsds.write import imported, merge
 from nutdamp.files.reader import Source
 from nutdamp.physics import attitude
 from nutdamp.views.exchange import export_text
@@ -276,11 +276,15 @@ def test_whatever_is_in_the_file_is_read_or_reported(
     write: Write, kind: str, data: st.DataObject
 ) -> None:
     """Contents, or faults with lines; never anything else."""
-    lines = data.draw(slips(histories.history(kind, histories.flown(3))))
+    if kind == "APM":
+        whole = export_text(messages.planned("tilted tensor, backwards"), "apm")
+    else:
+        whole = histories.history(kind, histories.flown(3))
     reported = [1]
     try:
-        contents = read_message(str(write("".join(lines), "history.txt")))
+        contents = read_message(str(write("".join(data.draw(slips(whole))), "message.txt")))
         assert len(contents.times) == len(contents.quaternions) == len(contents.rates)
+        imported(contents, "message.txt")
     except FaultyFile as wrong:
         reported = [fault.line for fault in wrong.faults]
     assert reported
