@@ -59,6 +59,7 @@ def test_the_state_of_a_record_is_that_of_the_motion(
     shown = run("import", "history.txt", "--into", "disc.yaml", *at, "-o", "now.yaml", status=0)
     rated = kind in histories.RATED
     assert ("follow from its attitudes" in shown.stderr) == (not rated)
+    assert "name: Disc  # as weighed\nmass: 25 kg\n" in (tmp_path / "now.yaml").read_text()
     now = nutdamp.load(tmp_path / "now.yaml")
     turned = attitude.matrix(present(now.attitude).quaternion)
     assert reference.turned(motions[index].rotation, turned) < 1e-9

@@ -578,32 +578,6 @@ def quaternion(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
     return present(spacecraft.attitude).quaternion
 
 
-@pytest.mark.parametrize(("form", "at"), [("apm", None), ("aem", None), ("aem", "7s")])
-@pytest.mark.parametrize("text", [SPACECRAFT, SKEW], ids=["symmetric", "tensor"])
-def test_a_message_is_merged_into_a_file(
-    run: Run, tmp_path: Path, text: str, form: str, at: str | None
-) -> None:
-    """Into a file with another motion: then it moves as the one that the message is of."""
-    path, plan = exported(tmp_path, text, form)
-    other = text.replace("[0.2 rad/s, 5 deg/s, 30 rpm]", "[0.1 rad/s, 2 deg/s, 29 rpm]").replace(
-        "[0.9, 0.1,", "[1, 0,"
-    )
-    (tmp_path / "other.yaml").write_text(other)
-    more = () if at is None else ("--at", at)
-    run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *more, status=0)
-    merged = nutdamp.load(tmp_path / "merged.yaml")
-    since = float(present(present(merged.attitude).epoch).removesuffix("Z")[17:])
-    assert since >= (0.0 if at is None else 7.0)
-    rates, quaternions = plan.spacecraft.inertia.in_file_axes(
-        *plan.reaching(20.0).motion(np.array([since]))
-    )
-    assert np.allclose(merged.rates, rates[0], rtol=0.0, atol=1e-9)
-    assert turned(quaternion(merged), quaternions[0]) < 1e-8
-    lines = (tmp_path / "merged.yaml").read_text().splitlines()
-    assert lines[1] == "name: Sounder  # flown twice"
-    assert lines[3].endswith("rpm]   # as released")
-
-
 def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) -> None:
     path, _ = exported(tmp_path, SKEW, "apm")
     (tmp_path / "other.yaml").write_text(SPACECRAFT)
