@@ -414,8 +414,8 @@ def _sections(reader: MessageReader, form: Form) -> list[BlockLines]:
                 reader.fault(line, content, f"{within.name}_STOP is missing before it")
             within = BlockLines(edge[1], line, [], [])
             if edge[1] not in form.blocks:
-                known = ", ".join(f"{name}_START" for name in form.blocks)
-                reader.fault(line, content, f"unknown block; known are {known}")
+                starts = ", ".join(f"{name}_START" for name in form.blocks)
+                reader.fault(line, content, f"unknown block; known are {starts}")
                 continue
             if edge[1] in reader.lines and not form.blocks[edge[1]].repeated:
                 problem = "a second block of this kind; which one counts is not said"
@@ -628,11 +628,11 @@ def _acm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
 
 def _stk(reader: MessageReader) -> Contents:
     """Keywords, the line that names the columns, and data lines; case does not count."""
-    known = {word.casefold(): word for word in (*names(message.STK_KEYWORDS), *message.STK_ROWS)}
+    spelling = {word.casefold(): word for word in (*names(message.STK_KEYWORDS), *message.STK_ROWS)}
     keywords, data = BlockLines("", 1, [], []), BlockLines("", 1, [], [])
     for line, content in reader.tokens[1:]:
         first, *rest = content.partition("#")[0].split() or ["begin"]
-        word = known.get(first.casefold(), first)
+        word = spelling.get(first.casefold(), first)
         if word.casefold() == "end":
             break
         if data.name:

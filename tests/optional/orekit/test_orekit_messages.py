@@ -337,15 +337,15 @@ def test_histories_that_are_read(kind: str, tmp_path: Path) -> None:
     segments = list(messages.parse("acm" if kind == "ACM" else "aem", text).getSegments())
     if kind == "ACM":
         data = segments[0].getData()
-        given = list(data.getAttitudeBlocks().get(0).getAttitudeStates())
-        seen = [(state.getDate(), state.toAngular(None)) for state in given]
+        records = list(data.getAttitudeBlocks().get(0).getAttitudeStates())
+        seen = [(state.getDate(), state.toAngular(None)) for state in records]
         physical = data.getPhysicBlock()
         assert physical.getWetMass() == contents.mass
         matrix = np.array(physical.getInertiaMatrix().getData())
         assert matrix * (2.0 * np.eye(3) - 1.0) == pytest.approx(present(contents.tensor))
     else:
-        given = [list(segment.getAngularCoordinates()) for segment in segments]
-        seen = [(record.getDate(), record) for record in [*given[0], *given[1][1:]]]
+        parts = [list(segment.getAngularCoordinates()) for segment in segments]
+        seen = [(record.getDate(), record) for record in [*parts[0], *parts[1][1:]]]
     assert len(seen) == len(contents.times)
     start = messages.date(contents.epoch.text)
     for index, (date, record) in enumerate(seen):
