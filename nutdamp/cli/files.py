@@ -342,7 +342,6 @@ def import_command(
     from nutdamp.files.ccsds.read import read_message
     from nutdamp.files.ccsds.write import contradictions, imported, merge
     from nutdamp.flight.propagation import flown
-    from nutdamp.spacecraft.schedule import Schedule
     from nutdamp.views.parts import pulse_table
 
     contents = read_message(file)
@@ -350,18 +349,17 @@ def import_command(
         source = FileInput(into).source(job.remark, job.doubt)
         text, remarks, doubts = merge(source, contents, at or 0.0, inertia=inertia)
         deliver([(output, lambda: text)])
-        pulses = Schedule()
     else:
         text, body, pulses = imported(contents, file)
         sheet = (schedule, lambda: pulse_table(flown(body, pulses)).csv())
         deliver([(output, lambda: text), sheet])
         remarks, doubts = contents.remarks, contradictions(contents, body, "the latter nutation")
+        if pulses.pulses and schedule is None:
+            remarks += (f"{len(pulses)} manoeuvres; --schedule FILE writes them",)
     for entry in remarks:
         job.remark(f"{file}: {entry}")
     for entry in doubts:
         say(f"{file}: warning: {entry}")
-    if pulses.pulses and schedule is None:
-        job.remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")
 
 
 POINTS = 6  # horizons tried for each front where no number follows ``--trade``

@@ -457,7 +457,8 @@ def fit_command(
     axis_dec_deg, axis_x, axis_y and axis_z, q_w to q_z, acceleration_m_s2, crossing_azimuth_deg and
     crossing_elevation_deg of crossing_ra_deg and crossing_dec_deg (of the Sun where they are
     empty), sun_aspect_deg,
-    sun_pulse (0 or 1); empty cells are missing samples.
+    sun_pulse (0 or 1); empty cells are missing samples. It may be an attitude history instead: an
+    AEM or ACM in KVN, or an attitude file of STK.
     Least squares on the closed forms of the coast; what the data do not tell stays at the
     tolerances of the file.
     -o writes the file with its comments kept: motion at --at, moments, and as dispersions how well

@@ -102,8 +102,7 @@ AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
 """Inertial frames that the formats have a name for, and their names in that of the Systems Tool
 Kit.
 """
-FRAMES = tuple(AXES)
-FRAME_NAMES = {**{frame: frame for frame in FRAMES}, "ICRF": "GCRF"}
+FRAME_NAMES = {**{frame: frame for frame in AXES}, "ICRF": "GCRF"}
 """Frames of a spacecraft file by their names in messages."""
 
 MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
@@ -163,10 +162,8 @@ def reference(spacecraft: Spacecraft) -> Reference:
             f"this format needs {names}, which the spacecraft file does not give; {cure}"
         )
     frame = "EME2000" if start.frame in PRECESSED else start.frame
-    if frame not in FRAMES:
-        problem = (
-            f"{frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
-        )
+    if frame not in AXES:
+        problem = f"{frame!r} is no frame that the format knows; expected one of {', '.join(AXES)}"
         raise Unsuitable(("attitude", "frame"), problem)
     return Reference(Epoch.parse(start.epoch), frame)
 

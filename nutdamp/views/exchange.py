@@ -104,7 +104,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
 
 def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
     """A format that needs epoch and frame, with a track to ``until`` s; messages are created now to
-    the second. The only place where directions leave the frame of the file: for one of `FRAMES`.
+    the second. The only place where directions leave the frame of the file: for one of `AXES`.
     """
     from nutdamp.common.time import Epoch
     from nutdamp.files.ccsds import message, write

@@ -170,6 +170,7 @@ def parse(kind: str, text: str) -> Any:
         kind == "opm"
     ):  # it asks for its centre and the mu of that, and neither ephemerides nor gravity are at hand
         builder = builder.withMu(MU)
+    if "CENTER_NAME" in text or kind == "opm":
         _earth()
     parser = getattr(builder, f"build{kind.capitalize()}Parser")()
     proxy = import_module("jpype").JProxy

@@ -276,7 +276,7 @@ ACM_BLOCKS: dict[str, Layout] = {
 STK_KEYWORDS = (
     *_rows("NumberOfAttitudePoints", unit=""),
     *_rows("ScenarioEpoch", kind="date"),
-    *_rows("CoordinateAxes", kind="frame"),
+    Keyword("CoordinateAxes", kind="frame", words=("J2000", "ICRF")),
     Keyword("TimeFormat", required=False, words=("EpSec",)),
     *_rows(
         *("CentralBody", "BlockingFactor", "InterpolationOrder", "InterpolationMethod"),

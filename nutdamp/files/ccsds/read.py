@@ -18,7 +18,7 @@ from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, listed, nearest
 from nutdamp.files.ccsds import message
 from nutdamp.files.ccsds.message import FORMS, VERSION, Form, Keyword, Layout, names
-from nutdamp.files.export import AXES, FRAME_NAMES, FRAMES, MONTHS
+from nutdamp.files.export import AXES, FRAME_NAMES, MONTHS
 from nutdamp.files.fields import LONGEST_NAME
 from nutdamp.files.yaml import decode, read_bytes, read_limited
 from nutdamp.physics import attitude
@@ -28,7 +28,6 @@ MOST_BYTES = 16 << 20  # size of a message, many times more than its most manoeu
 LARGEST = 1e15  # larger magnitudes are nothing physical
 UNIT = 1e-4  # deviation from length one up to which a quaternion counts as rounded
 AGREES = 1e-4  # up to which SPIN agrees with other blocks of an APM: rad, and relative for rates
-SAME = 1.0 - AGREES**2 / 8.0  # product of the quaternions of attitudes that agree
 
 BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 """Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
@@ -85,22 +84,21 @@ class Contents(NamedTuple):
     def at(self, time: float = 0.0, spin: float = 0.0) -> Contents:
         """The first record from ``time`` s on, of a body that spins at about ``spin`` rad/s.
 
-        Rates that it has not are those of the polynomial through the turns to up to two records on
-        either side, or of the spin alone. Raises BadRequest where there is no record.
+        Rates that it has not are those of the polynomial through the turns to the four records
+        nearest, or of the spin alone. Raises BadRequest where there is no record.
         """
         index = int(np.searchsorted(self.times, time))
         if index == len(self.times):
             last = f"{self.times[-1]:.6g} s after its first record" if index else "without records"
             raise BadRequest(f"the history ends {last}: expected a time in it")
-        record = [index]
         rates, remarks = self.rates[index], self.remarks
         unknown = np.isnan(rates)
         speed = abs(spin if unknown[2] else rates[2])
-        near = np.arange(max(index - 2, 0), min(index + 3, len(self.times)))
+        first, last = np.searchsorted(self.stretches, self.stretches[index] + np.arange(2)).tolist()
+        begin = max(min(index - 2, last - 5), first)
+        near = np.arange(begin, min(begin + 5, last))
+        near = near[np.abs(self.times[near] - self.times[index]) * speed < RADIANS_BETWEEN]
         span = self.times[near] - self.times[index]
-        usable = np.abs(span) * speed < RADIANS_BETWEEN
-        usable &= self.stretches[near] == self.stretches[index]
-        near, span = near[usable], span[usable]
         if unknown.any() and len(near) > 1:
             turns = attitude.multiply(
                 attitude.conjugate(self.quaternions[index]), self.quaternions[near]
@@ -120,16 +118,15 @@ class Contents(NamedTuple):
         return self._replace(
             epoch=self.epoch.plus(float(self.times[index])),
             times=np.zeros(1),
-            quaternions=self.quaternions[record],
+            quaternions=self.quaternions[[index]],
             rates=rates[None],
-            nutations=self.nutations[record],
-            stretches=self.stretches[record],
+            nutations=self.nutations[[index]],
+            stretches=self.stretches[[index]],
             remarks=remarks,
         )
 
 
-Entry = tuple[int, str, str, str | None]
-"""Line, keyword, value and unit."""
+Entry = tuple[int, str, str, str | None]  # line, keyword, value and unit
 
 
 class BlockLines(NamedTuple):
@@ -218,7 +215,7 @@ class MessageReader:
         if fixed and not in_body:
             raise ValueError(f"{name!r} is no frame fixed in the body; expected SC_BODY_1")
         if frame is None:
-            expected = f"SC_BODY_1 or one of {', '.join(FRAMES)}"
+            expected = f"SC_BODY_1 or one of {', '.join(FRAME_NAMES)}"
             raise ValueError(f"{name!r} is no frame known here; expected {expected}")
         shared = self.frames.setdefault(in_body, frame)
         if AXES.get(shared, shared) != AXES.get(frame, frame):
@@ -365,10 +362,9 @@ def spin_rates(columns: Mapping[str, Vector], quaternions: Vector) -> Vector:
     return np.asarray((about * momentum).T + np.outer(own, [0.0, 0.0, 1.0]))
 
 
+# Quaternions (n, 4), rates (n, 3) rad/s and nutations (n,) rad of records without jumps; NaN where
+# they are not told.
 Motion = tuple[Vector, Vector, Vector]
-"""Records without jumps: quaternions (n, 4), none where the attitude is not known, rates (n, 3)
-rad/s and nutations (n,) rad, NaN where they are not told.
-"""
 
 
 def is_message(path: str) -> bool:
@@ -418,8 +414,8 @@ def _sections(reader: MessageReader, form: Form) -> list[BlockLines]:
                 reader.fault(line, content, f"{within.name}_STOP is missing before it")
             within = BlockLines(edge[1], line, [], [])
             if edge[1] not in form.blocks:
-                known = ", ".join(f"{name}_START" for name in form.blocks)
-                reader.fault(line, content, f"unknown block; known are {known}")
+                starts = ", ".join(f"{name}_START" for name in form.blocks)
+                reader.fault(line, content, f"unknown block; known are {starts}")
                 continue
             if edge[1] in reader.lines and not form.blocks[edge[1]].repeated:
                 problem = "a second block of this kind; which one counts is not said"
@@ -549,7 +545,8 @@ def _apm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
                 turn = block.attitudes(columns, [])
                 spun = np.nan_to_num(spin_rates(columns, turn))
                 where = f"line {section.line}: SPIN gives"
-                if abs(float(np.vdot(quaternion, turn))) < SAME:
+                # The product of quaternions is the cosine of half the angle between them.
+                if abs(float(np.vdot(quaternion, turn))) < 1.0 - AGREES**2 / 8.0:
                     other = "another attitude than the blocks before it, which count"
                     reader.remarks.append(f"{where} {other}")
                 if np.linalg.norm(rates - spun) > AGREES * np.linalg.norm(rates):
@@ -605,7 +602,8 @@ def _aem(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
 
 def _acm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Contents:
     """Attitude of ATT, mass and inertia of PHYS; covariances and manoeuvres are not read."""
-    metadata = next((part for part in sections if part.name == "META"), about.section)
+    missing = BlockLines("META", 1, [], [])
+    metadata = next((part for part in sections if part.name == "META"), missing)
     about = Fields(reader, metadata, message.ACM_BLOCKS["META"].keywords)
     zero = about.values.get("EPOCH_TZERO")
     tensor = mass = None
@@ -630,11 +628,11 @@ def _acm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
 
 def _stk(reader: MessageReader) -> Contents:
     """Keywords, the line that names the columns, and data lines; case does not count."""
-    known = {word.casefold(): word for word in (*names(message.STK_KEYWORDS), *message.STK_ROWS)}
+    spelling = {word.casefold(): word for word in (*names(message.STK_KEYWORDS), *message.STK_ROWS)}
     keywords, data = BlockLines("", 1, [], []), BlockLines("", 1, [], [])
     for line, content in reader.tokens[1:]:
         first, *rest = content.partition("#")[0].split() or ["begin"]
-        word = known.get(first.casefold(), first)
+        word = spelling.get(first.casefold(), first)
         if word.casefold() == "end":
             break
         if data.name:

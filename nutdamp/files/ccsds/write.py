@@ -558,7 +558,13 @@ def imported(contents: Contents, path: str) -> tuple[str, Spacecraft, Schedule]:
     if contents.mass is not None:
         lines.append(f"mass: {contents.mass!r} kg")
     texts = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in rates.tolist())
-    lines += [*_inertia(tensor), f"omega0: [{texts}]"]
+    first, second, third = np.diag(tensor).tolist()
+    if first == second and not np.triu(tensor, 1).any():
+        lines.append(f"inertia: {{A: {first!r} kg m^2, C: {third!r} kg m^2}}")
+    else:
+        rows = (", ".join(f"{part!r} kg m^2" for part in row) for row in tensor.tolist())
+        lines += ["inertia:", "  tensor:", *(f"    - [{row}]" for row in rows)]
+    lines.append(f"omega0: [{texts}]")
     if not np.isnan(quaternion).any():
         lines += [
             "attitude:",
@@ -594,11 +600,17 @@ def imported(contents: Contents, path: str) -> tuple[str, Spacecraft, Schedule]:
         raise FaultyFile(faults) from None
 
 
+def acute(record: Contents) -> float:
+    """Nutation that a record states, rad, of a body that spins either way; NaN of none."""
+    stated = abs(float(record.nutations[0]))
+    return min(stated, math.pi - stated)
+
+
 def contradictions(record: Contents, spacecraft: Spacecraft, remains: str) -> list[str]:
     """Contradiction between the nutation that a record states and that by inertia and period, of
     which one ``remains``.
     """
-    stated, follows = abs(float(record.nutations[0])), spacecraft.widest.nutation
+    stated, follows = acute(record), spacecraft.widest.nutation
     if math.isnan(stated) or abs(follows - stated) <= ROUNDED + SAME_NUTATION * stated:
         return []
     return [
@@ -606,14 +618,6 @@ def contradictions(record: Contents, spacecraft: Spacecraft, remains: str) -> li
         f"NUTATION_PER gives one of {math.degrees(follows):.4g} deg; one of the three is wrong, "
         f"and the file has {remains}"
     ]
-
-
-def _inertia(tensor: Vector) -> list[str]:
-    first, second, third = np.diag(tensor).tolist()
-    if first == second and not (tensor - np.diag(np.diag(tensor))).any():
-        return [f"inertia: {{A: {first!r} kg m^2, C: {third!r} kg m^2}}"]
-    rows = (", ".join(f"{part!r} kg m^2" for part in row) for row in tensor.tolist())
-    return ["inertia:", "  tensor:", *(f"    - [{row}]" for row in rows)]
 
 
 def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list[str]:
@@ -673,19 +677,17 @@ def merge(
         turn = record.quaternions[0]
         rates = rates if np.isnan(record.rates).any() else record.rates[0]
     after = replace(after, omega0=axes.T @ rates)
-    if record is not contents and record.nutations[0]:
-        stated = abs(float(record.nutations[0]))
-        doubts = contradictions(record, after, "its spin and nutation, not the period")
+    if record is not contents and acute(record) > 0.0:
+        doubts = contradictions(record, after, "spin and nutation of the message, not its period")
         first, second, third = after.inertia.momentum(after.omega0).tolist()
-        share = abs(third) * math.tan(stated) / math.hypot(first, second)
-        if not math.isnan(share):
-            after = replace(after, omega0=after.omega0 * (share, share, 1.0))
+        share = abs(third) * math.tan(acute(record)) / math.hypot(first, second)
+        after = replace(after, omega0=after.omega0 * (share, share, 1.0))
     turned = not np.isnan(turn).any()
     if turned:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
         own = None if before.attitude is None else before.attitude.frame
-        axes_of = AXES.get  # a file in J2000 stays so where the message says EME2000
-        frame = own if axes_of(own or "") == axes_of(contents.frame or "") else contents.frame
+        # A file in J2000 stays so where the message says EME2000.
+        frame = own if AXES.get(f"{own}") == AXES.get(f"{contents.frame}") else contents.frame
         after = replace(after, attitude=Attitude(turn, epoch_after(record.epoch.text, 0.0), frame))
     later = Later(before, after, quaternion)
 

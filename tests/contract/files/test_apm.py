@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
 from support import messages
 from support.builders import present
 from support.cases import deep
-from support.contract import CASES, Write, check_faults, faults, slips
+from support.contract import CASES, Write, check_faults, faults
 from support.golden import check_text
 from support.places import case
 
@@ -310,20 +309,6 @@ def test_what_is_no_such_message(read: Read) -> None:
         assert faults(read_message, "huge.apm") == ["0:0: : too large: more than 16 MiB"]
     with pytest.raises(CannotRead):
         read_message("missing.apm")
-
-
-@pytest.mark.deep
-@given(lines=slips(GOOD))
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_whatever_is_in_the_file_is_read_or_reported(read: Read, lines: list[str]) -> None:
-    """Contents, or faults with lines; never anything else."""
-    reported = [1]
-    try:
-        imported(read("".join(lines)), "a.apm")
-    except FaultyFile as wrong:
-        reported = [fault.line for fault in wrong.faults]
-    assert reported
-    assert min(reported) >= 1
 
 
 def test_a_message_without_inertia_makes_no_spacecraft_file_of_its_own(read: Read) -> None:

@@ -4,15 +4,17 @@ import math
 import re
 from importlib import import_module
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support import messages
+from support import histories, messages
 from support.builders import present
 from support.contract import PUSHED, pushing, valved, velocity_change
 
 from nutdamp.common.time import Epoch
+from nutdamp.files.ccsds.read import read_message
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude, sky
 from nutdamp.views.exchange import export_text
@@ -320,6 +322,61 @@ def test_the_second_reader_of_orbit_messages(reader: Any, notation: str) -> None
     message = reader.Opm.from_str(export_text(plan, "opm", xml=notation == "xml"), notation)
     message.validate()
     assert len(message.segment.data.maneuver_parameters) == len(plan.pulses)
+
+
+READ = (*histories.KINDS, "ACM")
+
+
+@pytest.mark.usefixtures("_orekit")
+@pytest.mark.parametrize("kind", READ)
+def test_histories_that_are_read(kind: str, tmp_path: Path) -> None:
+    """Attitudes and rates of every record are those that Orekit reads."""
+    text = histories.history(kind, histories.flown(9))
+    (tmp_path / "history.txt").write_text(text)
+    contents = read_message(str(tmp_path / "history.txt"))
+    segments = list(messages.parse("acm" if kind == "ACM" else "aem", text).getSegments())
+    if kind == "ACM":
+        data = segments[0].getData()
+        records = list(data.getAttitudeBlocks().get(0).getAttitudeStates())
+        seen = [(state.getDate(), state.toAngular(None)) for state in records]
+        physical = data.getPhysicBlock()
+        assert physical.getWetMass() == contents.mass
+        matrix = np.array(physical.getInertiaMatrix().getData())
+        assert matrix * (2.0 * np.eye(3) - 1.0) == pytest.approx(present(contents.tensor))
+    else:
+        parts = [list(segment.getAngularCoordinates()) for segment in segments]
+        seen = [(record.getDate(), record) for record in [*parts[0], *parts[1][1:]]]
+    assert len(seen) == len(contents.times)
+    start = messages.date(contents.epoch.text)
+    for index, (date, record) in enumerate(seen):
+        assert date.durationFrom(start) == pytest.approx(contents.times[index], abs=1e-9)
+        axes = attitude.matrix(contents.quaternions[index])
+        assert messages.turned(messages.body_axes(record.getRotation()), axes) < 1e-9
+        if kind in histories.RATED:
+            rate = messages.components(record.getRotationRate())
+            if kind == "QUATERNION/ANGVEL":  # in J2000, which Orekit hands on as they stand
+                rate = axes.T @ rate
+            assert rate == pytest.approx(contents.rates[index], abs=1e-10)
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_the_second_reader_of_histories(reader: Any, kind: str, tmp_path: Path) -> None:
+    text = histories.history(kind, histories.flown(9))
+    (tmp_path / "history.txt").write_text(text)
+    contents = read_message(str(tmp_path / "history.txt"))
+    if kind == "ACM":
+        data = reader.Acm.from_str(text, "kvn").segment.data
+        rows = np.array(data.att[0].att_lines)
+        assert rows[:, 0] == pytest.approx(contents.times)
+        assert rows[:, [4, 1, 2, 3]] == pytest.approx(contents.quaternions)
+        assert np.radians(rows[:, 5:]) == pytest.approx(contents.rates)
+        assert data.phys.wet_mass == contents.mass
+        assert -data.phys.ixz == present(contents.tensor)[0, 2]
+        return
+    message = reader.Aem.from_str(text, "kvn")
+    message.validate()
+    states = [state for segment in message.segments for state in segment.data.attitude_states]
+    assert len(states) == len(contents.times) + 1  # of two segments that share a record
 
 
 @pytest.mark.orekit

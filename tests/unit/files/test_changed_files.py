@@ -587,47 +587,6 @@ def quaternion(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
     return present(spacecraft.attitude).quaternion
 
 
-@pytest.mark.parametrize("text", [SPACECRAFT, SKEW], ids=["symmetric", "tensor"])
-def test_a_history_is_read_as_it_was_written(tmp_path: Path, text: str) -> None:
-    path, plan = exported(tmp_path, text, "aem")
-    history = read_message(str(path))
-    rates, quaternions = plan.spacecraft.inertia.in_file_axes(
-        *plan.reaching(20.0).motion(history.times)
-    )
-    assert np.allclose(history.rates, rates, rtol=0.0, atol=1e-9)
-    assert (
-        max(turned(*pair) for pair in zip(present(history.quaternions), quaternions, strict=True))
-        < 1e-9
-    )
-    assert history.times[-1] == pytest.approx(20.0, abs=1e-6)
-
-
-@pytest.mark.parametrize(("form", "at"), [("apm", None), ("aem", None), ("aem", "7s")])
-@pytest.mark.parametrize("text", [SPACECRAFT, SKEW], ids=["symmetric", "tensor"])
-def test_a_message_is_merged_into_a_file(
-    run: Run, tmp_path: Path, text: str, form: str, at: str | None
-) -> None:
-    """Into a file with another motion: then it moves as the one that the message is of."""
-    path, plan = exported(tmp_path, text, form)
-    other = text.replace("[0.2 rad/s, 5 deg/s, 30 rpm]", "[0.1 rad/s, 2 deg/s, 29 rpm]").replace(
-        "[0.9, 0.1,", "[1, 0,"
-    )
-    (tmp_path / "other.yaml").write_text(other)
-    more = () if at is None else ("--at", at)
-    run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *more, status=0)
-    merged = nutdamp.load(tmp_path / "merged.yaml")
-    since = float(present(present(merged.attitude).epoch).removesuffix("Z")[17:])
-    assert since >= (0.0 if at is None else 7.0)
-    rates, quaternions = plan.spacecraft.inertia.in_file_axes(
-        *plan.reaching(20.0).motion(np.array([since]))
-    )
-    assert np.allclose(merged.rates, rates[0], rtol=0.0, atol=1e-9)
-    assert turned(quaternion(merged), quaternions[0]) < 1e-8
-    lines = (tmp_path / "merged.yaml").read_text().splitlines()
-    assert lines[1] == "name: Sounder  # flown twice"
-    assert lines[3].endswith("rpm]   # as released")
-
-
 def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) -> None:
     path, _ = exported(tmp_path, SKEW, "apm")
     (tmp_path / "other.yaml").write_text(SPACECRAFT)
@@ -682,42 +641,6 @@ def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
         turned(quaternion(nutdamp.load(tmp_path / "merged.yaml")), quaternion(plan.spacecraft))
         < 1e-8
     )
-
-
-def test_a_history_is_telemetry(tmp_path: Path) -> None:
-    path, plan = exported(tmp_path, SPACECRAFT, "aem")
-    guessed = plan.spacecraft.with_(inertia={"C": 82.0}, omega0=[0.18, 0.09, 3.1])
-    estimate = nutdamp.fit(path, guessed, ignored=print).spacecraft()
-    assert pytest.approx(80.0 / 120.0, rel=1e-4) == estimate.inertia.C / estimate.inertia.A
-    assert estimate.omega0 == pytest.approx(plan.spacecraft.omega0, abs=1e-4)
-
-
-@pytest.mark.parametrize(("old", "new", "problem"), [
-    ("= QUATERNION/ANGVEL", "= QUATERNION/DERIVATIVE", "is not read"),
-    ("CCSDS_AEM_VERS = 2.0", "CCSDS_AEM_VERS = 1.0", "expected CCSDS_APM_VERS.* = 2.0"),
-    ("DATA_STOP", "", "DATA_STOP"),
-    ("REF_FRAME_A          = EME2000", "REF_FRAME_A          = MOON_ME", "no frame known"),
-])  # fmt: skip
-def test_faults_of_a_history_are_named(tmp_path: Path, old: str, new: str, problem: str) -> None:
-    path, _ = exported(tmp_path, SPACECRAFT, "aem")
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
-    with pytest.raises(FaultyFile, match=problem):
-        read_message(str(path))
-
-
-def test_records_out_of_order_and_of_wrong_length_are_faults_with_lines(tmp_path: Path) -> None:
-    path, _ = exported(tmp_path, SPACECRAFT, "aem")
-    lines = path.read_text().splitlines()
-    first = lines.index("DATA_START") + 1
-    lines[first], lines[first + 1] = lines[first + 1], lines[first]
-    lines[first + 3] += " 1.0"
-    for end in ("\n", "\r\n", "\r", "\n\r"):  # those of the standard
-        path.write_bytes(end.join(lines).encode())
-        with pytest.raises(FaultyFile) as wrong:
-            read_message(str(path))
-        assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
 
 
 @pytest.mark.parametrize(
