@@ -48,7 +48,9 @@ _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
 )
 
 
-def explained(requested: str, named: Callable[[str], Iterator[Topic]] | None = None) -> Topic:
+def explained(
+    requested: str, named: Callable[[str], Iterator[Topic]] = lambda _: iter(())
+) -> Topic:
     """Words, page and keys of the file of that name as one topic, else the first that is ``named``
     so in a spacecraft; raises BadRequest, which names a near one.
     """
@@ -68,7 +70,7 @@ def explained(requested: str, named: Callable[[str], Iterator[Topic]] | None = N
         if not texts and not keys:
             if section := next(_sections(wanted), None):
                 return section
-            if named is not None and (own := next(named(requested), None)):
+            if own := next(named(requested), None):
                 return own
             if guide.NUMBER.fullmatch(requested.strip().casefold()):
                 raise
