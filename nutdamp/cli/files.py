@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -45,13 +45,14 @@ from nutdamp.cli.options import (
 from nutdamp.cli.plan import compared_with, robust_of, scheme_option
 from nutdamp.cli.studies import flown_options, fronts_of, plan_or_read
 from nutdamp.common.work import SAMPLES
-from nutdamp.errors import cure_of, printable
+from nutdamp.errors import NutdampError, cure_of, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
 from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
 
 if TYPE_CHECKING:
     from nutdamp.errors import Fault
     from nutdamp.files.editing import Setting
+    from nutdamp.views.guide import Topic
 
 
 @click.command("check")
@@ -217,11 +218,12 @@ def schema_command(output: str) -> None:
 @click.command("explain")
 @click.argument("topic", nargs=-1, metavar="[TOPIC]")
 def explain_command(topic: tuple[str, ...]) -> None:
-    """Explain a page of the guide, a scheme, an equation, a heading of a table, or a key of the
+    """Explain a page of the guide, a scheme, an equation, a word of a screen, or a key of the
     spacecraft file.
 
     TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word
-    such as `tilt`, `H` or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a
+    such as `tilt`, `H` or `on_time_s`; `file.thrusters`; a channel of spacecraft.yaml here, else
+    of the built-in example. Without it the pages are listed. On a
     terminal long pages go through a pager.
     """
     from nutdamp.views import explain
@@ -229,7 +231,9 @@ def explain_command(topic: tuple[str, ...]) -> None:
     requested = " ".join(topic).strip()
     shown = console()
     screen = (
-        explain.topic_screen(explain.explained(requested)) if requested else explain.topics_screen()
+        explain.topic_screen(explain.explained(requested, _channels))
+        if requested
+        else explain.topics_screen()
     )
     if shown.is_terminal and on_keyboard():
         with shown.capture() as captured:
@@ -238,6 +242,20 @@ def explain_command(topic: tuple[str, ...]) -> None:
             click.echo_via_pager(captured.get())
             return
     show(screen)
+
+
+def _channels(name: str) -> Iterator[Topic]:
+    """Channels of that ``name`` of the default file, or of the built-in example where there is
+    none without fault.
+    """
+    from nutdamp.api import example
+    from nutdamp.views.check import channel_topics
+
+    try:
+        spacecraft = FileInput(None).source(lambda _: None, lambda _: None).read()
+    except NutdampError:
+        spacecraft = example()
+    return channel_topics(spacecraft, name)
 
 
 def on_keyboard() -> bool:

@@ -47,21 +47,17 @@ def spacecraft_notes(spacecraft: Spacecraft) -> Iterator[Note]:
         yield note("principal-axis-off", tilt_deg=math.degrees(tilt), limit_deg=limit)
     channels = [channel for channel in spacecraft.channels if channel.damps]
     pushes = np.array([channel.transverse / abs(channel.transverse) for channel in channels])
-    names = ", ".join(channel.name for channel in channels)
     if len(channels) > 1 and np.outer(pushes, pushes.conj()).real.min() >= math.cos(ALIKE):
+        names = ", ".join(channel.name for channel in channels)
         yield note("channels-push-alike", channels=names, period_s=spacecraft.body_period)
-    shares = worths(spacecraft, channels) if channels else []
-    wasting = [
-        (channel.name, share)
-        for channel, share in zip(channels, shares, strict=True)
-        if share < WASTEFUL
-    ]
+    shares = dict(zip((each.name for each in channels), worths(spacecraft, channels), strict=True))
+    wasting = {name: share for name, share in shares.items() if share < WASTEFUL}
     if wasting:
         yield note(
             "channels-waste",
-            channels=", ".join(name for name, _ in wasting),
-            worth_percent=100.0 * max(share for _, share in wasting),
-            best=channels[shares.index(1.0)].name,
+            channels=", ".join(wasting),
+            worth_percent=100.0 * max(wasting.values()),
+            best=max(shares, key=shares.__getitem__),
         )
 
 

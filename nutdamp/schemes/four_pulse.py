@@ -125,8 +125,8 @@ def _fired_on_true_motion(
     from nutdamp.schemes.valve_commands import FlownBuilder
 
     builder = FlownBuilder(spacecraft)
-    most = spacecraft.limits.max_pulses or MOST_FLOWN
-    while len(builder.pulses) < most and builder.at_leg.nutation > LEFT and not work.exhausted():
+    count = spacecraft.limits.max_pulses or MOST_FLOWN
+    while len(builder.pulses) < count and builder.at_leg.nutation > LEFT and not work.exhausted():
         pulse = _best_pulse(builder.at_leg, channels, options.on_time)
         after = builder.fork()
         if pulse is None:

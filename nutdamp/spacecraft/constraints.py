@@ -189,10 +189,11 @@ def worths(spacecraft: Spacecraft, channels: Sequence[Channel]) -> list[float]:
     """Small nutation that each channel takes away for propellant (impulse where that of one is
     unknown), over that of the best.
     """
-    known = all(channel.mass_flow is not None for channel in channels)
+    weighed = all(channel.mass_flow is not None for channel in channels)
     circle = spacecraft.inertia.circle(spacecraft.spin)
     rates = [
-        float(np.linalg.norm(circle * channel.torque[:2])) / channel.cost_rate(by_propellant=known)
+        float(np.linalg.norm(circle * channel.torque[:2]))
+        / channel.cost_rate(by_propellant=weighed)
         for channel in channels
     ]
     return [rate / max(rates) for rate in rates]

@@ -27,6 +27,7 @@ from nutdamp.planning.notes import shift_notes, spacecraft_notes
 from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
+from nutdamp.views.guide import Topic
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.parts import derived_table, named, summary
 from nutdamp.views.tables import (
@@ -87,6 +88,25 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         *file_columns("json", "damps=channel.damps"),
     )
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
+
+
+def channel_topics(spacecraft: Spacecraft, name: str) -> Iterator[Topic]:
+    """Thrusters, arm, torque, on-times and steps of the channel of that ``name``."""
+    table = channel_table(spacecraft)
+    headings = [
+        f"{heading.name}, {heading.unit}".rstrip(", ") for heading in table.headings("screen")
+    ]
+    for channel, cells in zip(spacecraft.channels, table.cells("screen"), strict=True):
+        if channel.name == name:
+            force = 0.0 if channel.force is None else math.hypot(*channel.force)
+            arm = f"{channel.strength / force:.4g} m" if force else "not known"
+            rows = [
+                ("thrusters", ", ".join(thruster.name for thruster in channel.thrusters)),
+                ("arm", arm),
+                *zip(headings[1:], cells[1:], strict=True),
+            ]
+            text = "\n".join(f"- **{heading}**: {cell}" for heading, cell in rows)
+            yield Topic(name, f"a channel of {named(spacecraft).plain}", text)
 
 
 VALVES = (  # columns of pulses of valves that are alike

@@ -44,13 +44,15 @@ and their paragraph.
 ALIKE = ("glossary", "symbol")  # kinds whose names of one paragraph mean the same
 
 _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
-    r"([-,]+(N-m(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
+    r"([-,]+(N-m(-s)?|ft-lbf(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
 )
 
 
-def explained(requested: str) -> Topic:
-    """Words, page and keys of the file of that name as one topic; raises BadRequest, which names a
-    near one.
+def explained(
+    requested: str, named: Callable[[str], Iterator[Topic]] = lambda _: iter(())
+) -> Topic:
+    """Words, page and keys of the file of that name as one topic, else the first that is ``named``
+    so in a spacecraft; raises BadRequest, which names a near one.
     """
     name, _, below = requested.partition(".")
     if name.casefold() == guide.FILE and below:
@@ -68,6 +70,8 @@ def explained(requested: str) -> Topic:
         if not texts and not keys:
             if section := next(_sections(wanted), None):
                 return section
+            if own := next(named(requested), None):
+                return own
             if guide.NUMBER.fullmatch(requested.strip().casefold()):
                 raise
             near = guide.meant(nearest(wanted, guide.NAMES) or wanted, tuple(names()))

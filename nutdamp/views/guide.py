@@ -18,7 +18,9 @@ from nutdamp.errors import BadRequest, nearest
 FOLDER = Path(__file__).parents[1] / "guide"  # folder of the pages
 
 HEADING = re.compile(r"^##+ (.+)\n", re.MULTILINE)
-ROW = re.compile(r"^(?:- \*\*|\| )(.+?)(?:\*\*: | \| )(.+?)(?: \|)?$", re.MULTILINE)
+ROW = re.compile(  # to the end of its last line, which is indented
+    r"^(?:- \*\*|\| )(.+?)(?:\*\*: | \| )(.+?(?:\n  \S.*)*)(?: \|)?$(?!\n  \S)", re.MULTILINE
+)
 HEADS_OF_TABLE = re.compile(r"^\|.+\n\|[-|]+\n", re.MULTILINE)
 FORMULA = re.compile(r"(?:^    .+\n?)+", re.MULTILINE)
 

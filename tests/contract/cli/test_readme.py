@@ -26,7 +26,7 @@ from rich.console import Console
 from support import places, smoke
 from support.cases import deep, spread
 from support.commands import call, python, rows, words
-from support.golden import WRITE, check_text
+from support.golden import WRITE, check_text, load_texts
 from support.guide_pages import flow, keys, pages
 from support.process import Run
 from support.shown import parsed
@@ -43,6 +43,7 @@ from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
 from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
 from nutdamp.views import explain, guide, loop_cases, simulation
+from nutdamp.views.verdict import HEADLINES, MET
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -484,6 +485,94 @@ def test_every_heading_of_a_table_is_explained() -> None:
     } - {""}
     assert len(headings) > 60
     assert {heading for heading in headings if not is_known(heading)} == set()
+
+
+def test_every_title_and_bold_phrase_is_explained() -> None:
+    """Titles of tables, and literal texts with the style bold beside them."""
+    phrases = set()
+    for node in nodes(VIEWS.glob("*.py")):
+        parts = node.elts if isinstance(node, ast.Tuple) else []
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Text", "DataTable"):
+            parts = [*node.args, *(keyword.value for keyword in node.keywords)]
+        first, *styles = parts or [ast.Constant(0)]
+        titled = isinstance(node, ast.Call) and ast.unparse(node.func) == "DataTable"
+        if titled or any("bold" in ast.unparse(style) for style in styles):
+            phrases |= {text.strip(" :") for text in texts_in(first)} - {""}
+    assert len(phrases) > 25
+    assert {phrase for phrase in phrases if not is_known(phrase)} == set()
+
+
+SCREENS = ("cli.budget", "cli.check", "cli.disperse", "cli.loop", "cli.nothing", "cli.plan",
+           "cli.simulate", "glance", "loop.full", "loop.screen", "files.blocks-screen")  # fmt: skip
+OWN_NAMES = {"Sounder-1", "Sounder-1 (built-in example)", "Good", "Sat", "Tilted", "Upper", "T1",
+         "+", "-", "+M1", "-M1", "+M2", "-M2", "2 others"}  # fmt: skip
+"""Names of spacecraft and channels in the files of those screens."""
+
+
+def phrases_of(screen: str) -> Iterator[str]:
+    """Statuses, labels and headings of a screen: capitals at the beginning of a line; the first of
+    cells two blanks apart, without its bound and number; and below an empty line, up to the first
+    digit, what stands above one another.
+    """
+    heads: list[re.Match[str]] | None = None
+    for line in screen.split("\n"):
+        if status := re.match(r"(NOT [a-z]+|[A-Z]{2,}(?: [A-Z]{2,})*)[ :]", line):
+            yield status[1]
+        cells = list(re.finditer(r"\S+(?: \S+)*", line))
+        if not line:
+            heads = []
+            continue
+        if len(cells) < 2:
+            heads = None
+            continue
+        if heads is not None and not re.search(r"[\d:]", line):
+            heads += cells
+            continue
+        heading = ""
+        until = 0
+        for cell in sorted(heads or (), key=lambda cell: cell.start()):
+            beside = cell.start() >= until
+            if beside and heading:
+                yield heading
+            heading = cell[0] if beside else f"{heading} {cell[0]}"
+            until = cell.end() if beside else max(until, cell.end())
+        if heading:
+            yield heading
+        heads = None
+        if cells[0].start() == 0:
+            yield re.split(r" [≤≥]|, \d|:$|(?<=from) ", cells[0][0])[0]
+
+
+def test_every_status_label_and_heading_of_a_screen_is_explained() -> None:
+    """Those of the texts kept; an input is known by its tolerance, two words by each of them."""
+    phrases = {
+        re.sub(r" ([xy]|steerable|pulse \d|N\d)$", "", phrase)
+        for key, text in load_texts().items()
+        if key.startswith(SCREENS)
+        for phrase in phrases_of(text)
+    }
+    phrases = {phrase for phrase in phrases - OWN_NAMES if not phrase[0].isdigit()}
+    assert len(phrases) > 100
+    assert {"FLY", "NOT ENOUGH", "after pulses, deg", "nutation after deg"} <= phrases
+    unknown = {phrase for phrase in phrases if not is_known(phrase)}
+    halves = {phrase: re.split(", |: ", phrase, maxsplit=1) for phrase in unknown}
+    assert [
+        name for name, two in halves.items() if len(two) < 2 or not all(map(is_known, two))
+    ] == []
+
+
+def test_operators_words_and_channels_are_explained() -> None:
+    for word in (
+        *("coning", "wobble", "flat spin", "dual spin", "despin", "spin-up", "reorientation"),
+        *("precession manoeuvre", "active nutation control", "damper", "jet damping", "slosh"),
+        *("imbalance", "RCS", "burn", "thruster on-time", "Sun sensor", "Earth sensor"),
+        *("aspect angle", "attitude determination", *HEADLINES.values(), MET[True], MET[False]),
+        *("H turned", "after pulses", "spin error", "least delay margin"),
+    ):
+        assert is_known(word), word
+    assert "N m: (0, 8, 0)" in explained("+M2")
+    assert "0.8 m" in explained("+M2")
+    assert CliRunner().invoke(group, ["explain", "+M9"]).exit_code != 0
 
 
 def is_known(name: str) -> bool:

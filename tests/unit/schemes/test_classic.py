@@ -550,11 +550,11 @@ def test_a_channel_that_wastes_fires_where_the_others_are_not_enough(
     share: float, limits: Limits, options: Options, firing: int
 ) -> None:
     """Against the plan of the strong channels alone, which takes A|ω0| over their torque."""
-    most = math.radians(0.3)
-    body = spinner(channels=wasting(share), limits=limits, requirement=Requirement(most))
+    allowed = math.radians(0.3)
+    body = spinner(channels=wasting(share), limits=limits, requirement=Requirement(allowed))
     plan = feasible_by("four-pulse", body, options)
     assert len({pulse.channel for pulse in plan.pulses}) == firing
-    assert plan.flight.residual.nutation <= most
+    assert plan.flight.residual.nutation <= allowed
     alone = planning.plan(replace(body, channels=STRONG), "four-pulse", options).pulses
     if firing == 2:
         assert [pulse.t for pulse in plan.pulses] == [pulse.t for pulse in alone]
