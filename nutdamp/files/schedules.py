@@ -59,7 +59,13 @@ MOST_FIRED = 5_000
 LATEST = 100_000  # number of the last Sun pulse that may fire a block
 
 
-def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
+def _blocks_table(path: str | Path) -> Table:
+    return Table(path, BLOCKS_HEADER, "blocks")
+
+
+def read_blocks(
+    path: str | Path | Table, spacecraft: Spacecraft
+) -> tuple[tuple[Block, ...], list[str]]:
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not
     have.
 
@@ -68,7 +74,7 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     the steps of that file; every is 1 where it is left out. Raises CannotRead, and FaultyFile with
     every fault of the file.
     """
-    table = Table(path, BLOCKS_HEADER, "blocks")
+    table = path if isinstance(path, Table) else _blocks_table(path)
     commands = spacecraft.commands
     columns = {}
     for name in TIMES:
@@ -177,11 +183,15 @@ STARTS = ("start_s", "t_s")
 AGREES = 1e-6  # relative difference up to which a torque is that of the torquer
 
 
-def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
+def _pulses_table(path: str | Path) -> Table:
+    return Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
+
+
+def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
     """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault
     of the file.
     """
-    table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
+    table = path if isinstance(path, Table) else _pulses_table(path)
     if not {*STARTS} & {*table.header}:
         missing = f"the column is missing (or {STARTS[1]}, the centre)"
         table.fault(1, STARTS[0], missing + table.misspelt(STARTS[0]))
@@ -211,20 +221,19 @@ def read_plan(
     spacecraft: Spacecraft,
     options: SchemeOptions | None = None,
     *,
-    blocks: bool | None = None,
+    blocks: bool = False,
 ) -> tuple[Plan, tuple[str, ...]]:
-    """A schedule file, of pulses or of ``blocks`` (None: as its columns are), as a plan of that
-    name, and warnings, of broken limits too; raises as `read_pulses` does, and Infeasible without
-    Sun pulses.
+    """A schedule file, of pulses, or of blocks where its columns or ``blocks`` say so, as a plan of
+    that name, and warnings, of broken limits too; raises as `read_pulses` does, and Infeasible
+    without Sun pulses.
     """
-    if blocks is None:
-        header = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses").header
-        blocks = "first_sun_pulse" in header
-    if blocks:
-        commanded, warnings = read_blocks(path, spacecraft)
+    table = _blocks_table(path) if blocks else _pulses_table(path)
+    if blocks or "first_sun_pulse" in table.header:
+        table.known = BLOCKS_HEADER
+        commanded, warnings = read_blocks(table, spacecraft)
         pulses = fired(spacecraft, commanded)
     else:
-        pulses, warnings = read_pulses(path, spacecraft)
+        pulses, warnings = read_pulses(table, spacecraft)
     plan = Plan(
         spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True
     )
