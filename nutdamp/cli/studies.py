@@ -105,7 +105,7 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
         if schedule is not None:
             expect_read((), job.options, job.spacecraft, job.doubt)
         plain = job.options.of(SchemeOptions)
-        plan, warnings = read_plan(path, job.spacecraft, plain, blocks=blocks is not None or None)
+        plan, warnings = read_plan(path, job.spacecraft, plain, blocks=blocks is not None)
         job.doubt(*warnings)
         return plan
     if scheme is None:

@@ -46,6 +46,7 @@ PULSES_HEADER = (
 EFFECTIVE = ("effective_start_s", "effective_on_time_s")  # behind those, with valves
 
 UTC = "utc"
+SCHEDULE_HEADER = (*PULSES_HEADER, *EFFECTIVE, UTC)
 
 BLOCKS_HEADER = (
     *("block", "channel", "first_sun_pulse", "first_utc"),
@@ -59,7 +60,9 @@ MOST_FIRED = 5_000
 LATEST = 100_000  # number of the last Sun pulse that may fire a block
 
 
-def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
+def read_blocks(
+    path: str | Path | Table, spacecraft: Spacecraft
+) -> tuple[tuple[Block, ...], list[str]]:
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not
     have.
 
@@ -68,7 +71,7 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     the steps of that file; every is 1 where it is left out. Raises CannotRead, and FaultyFile with
     every fault of the file.
     """
-    table = Table(path, BLOCKS_HEADER, "blocks")
+    table = path if isinstance(path, Table) else Table(path, BLOCKS_HEADER, "blocks")
     commands = spacecraft.commands
     columns = {}
     for name in TIMES:
@@ -102,17 +105,18 @@ def _expect_apart(rows: Sequence[Row], blocks: Sequence[Block], column: str) -> 
     """Keep a fault in ``column`` of each block with a pulse that begins before another of the same
     Sun pulse is over; angles apart are times apart once they are flown.
     """
-    overlapped = set[int]()
-    for before, after in pairwise(firings(blocks)):
-        together = before.number == after.number and before.block.angle == after.block.angle
-        least = before.block.delay + before.block.width
-        if not together or after.block.delay >= least - TOUCHING or after.at in overlapped:
-            continue
-        overlapped.add(after.at)
-        line = rows[before.at].line
+    overlaps = {
+        after.at: (before, after)
+        for before, after in reversed([*pairwise(firings(blocks))])
+        if before.number == after.number
+        and before.block.angle == after.block.angle
+        and after.block.delay < before.block.delay + before.block.width - TOUCHING
+    }
+    for at, (before, after) in overlaps.items():
+        line, over = rows[before.at].line, before.block.delay + before.block.width
         problem = f"Sun pulse {after.number} fires it while the pulse of line {line} is on"
-        cure = f"{least:.6g} s or more after the Sun pulse, or other Sun pulses"
-        rows[after.at].fault(column, f"{problem}; expected {cure}")
+        cure = f"{over:.6g} s or more after the Sun pulse, or other Sun pulses"
+        rows[at].fault(column, f"{problem}; expected {cure}")
 
 
 def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block | None:
@@ -177,11 +181,11 @@ STARTS = ("start_s", "t_s")
 AGREES = 1e-6  # relative difference up to which a torque is that of the torquer
 
 
-def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
+def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
     """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault
     of the file.
     """
-    table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
+    table = path if isinstance(path, Table) else Table(path, SCHEDULE_HEADER, "pulses")
     if not {*STARTS} & {*table.header}:
         missing = f"the column is missing (or {STARTS[1]}, the centre)"
         table.fault(1, STARTS[0], missing + table.misspelt(STARTS[0]))
@@ -211,20 +215,20 @@ def read_plan(
     spacecraft: Spacecraft,
     options: SchemeOptions | None = None,
     *,
-    blocks: bool | None = None,
+    blocks: bool = False,
 ) -> tuple[Plan, tuple[str, ...]]:
-    """A schedule file, of pulses or of ``blocks`` (None: as its columns are), as a plan of that
-    name, and warnings, of broken limits too; raises as `read_pulses` does, and Infeasible without
-    Sun pulses.
+    """A schedule file, of pulses, or of blocks where its columns or ``blocks`` say so, as a plan of
+    that name, and warnings, of broken limits too; raises as `read_pulses` does, and Infeasible
+    without Sun pulses.
     """
-    if blocks is None:
-        header = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses").header
-        blocks = "first_sun_pulse" in header
-    if blocks:
-        commanded, warnings = read_blocks(path, spacecraft)
+    columns = BLOCKS_HEADER if blocks else SCHEDULE_HEADER
+    table = Table(path, columns, "blocks" if blocks else "pulses")
+    if blocks or "first_sun_pulse" in table.header:
+        table.known = BLOCKS_HEADER
+        commanded, warnings = read_blocks(table, spacecraft)
         pulses = fired(spacecraft, commanded)
     else:
-        pulses, warnings = read_pulses(path, spacecraft)
+        pulses, warnings = read_pulses(table, spacecraft)
     plan = Plan(
         spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True
     )

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -143,12 +144,10 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     )
     if goal is not None:
         expect_spin(spacecraft, goal, alone=alone)
-    chosen = None
-    if spacecraft.goal.axis is None:
-        chosen = opposite_blocks(spacecraft, most)
+    chosen = None if spacecraft.goal.axis is not None else opposite_blocks(spacecraft, most)
     if chosen is None and alone:
         chosen = _searched(spacecraft, most)
-    elif chosen is None or not requirements.complies(chosen.rank[1]):
+    elif chosen is None or not chosen.complies:
         try:
             in_legs = spin_and_turn(spacecraft, most)
         except Infeasible:
@@ -230,59 +229,56 @@ PHASES = 12  # delays of opposite blocks that are looked at, where the nutation 
 
 def opposite_blocks(spacecraft: Spacecraft, most: int | None) -> FlownSequence | None:
     """The best flown of the pairs of like blocks half a turn apart that bring the spin to its goal,
-    of the fewest pulses that comply; None where there is no such pair.
+    of the fewest pulses that comply; None where none keeps all limits and bounds but that of the
+    nutation, which further blocks may damp.
 
     What one pulse turns H by, the opposite one turns it back, but for what the spin changes
     between them. By several delays, where there is nutation to be taken along.
     """
-    search = BlockSearch(spacecraft, usable(spacecraft, axial=True), 2)
-    commands, turn, goal = search.commands, search.model.turn, spacecraft.goal.spin
-    if goal is None or commands.per_turn < 2 or most == 1:
+    commands, goal = spacecraft.commands, spacecraft.goal.spin
+    if commands is None or commands.per_turn < 2 or goal is None or most == 1:
         return None
+    search = BlockSearch(spacecraft, usable(spacecraft, axial=True), 2)
     change = (goal - spacecraft.spin) * spacecraft.inertia.C
-    first, half = search.earliest + 1, 0.5 * turn
+    first, half = search.earliest + 1, 0.5 * search.model.turn
     phases = half / PHASES * np.arange(PHASES if spacecraft.nutation > 0.0 else 1)
-    delays = np.unique(search.commanded(phases)).tolist()
-    pairs = list[tuple[Block, Block]]()
+    delays = [
+        [commands.after_sun_pulse(delay, spacecraft.spin) for delay in opposite]
+        for opposite in search.commanded(np.array([phases, phases + half]).T).tolist()
+    ]
+    pairs = list[tuple[Block, ...]]()
     for channel in search.channels:
-        for count in range(1, search.allowed // 2 + 1):
-            on_time = change / (2.0 * count * channel.axial) if channel.axial else 0.0
-            if on_time <= 0.0:
-                break
+        most_pulses = search.allowed if channel.axial * change > 0.0 else 0
+        for count in range(1, most_pulses // 2 + 1):
+            on_time = change / (2.0 * count * channel.axial)
             loaded = on_time if channel.valve is None else channel.valve.on_time_for(on_time)
             width = round(commands.nearest_width(loaded), 12)
             able = commandable_widths(commands, channel, width - 1e-12, width + 1e-12, 1).size
-            if not able or width + spacecraft.limits.gap > half:
-                continue
-            for delay in delays:
-                begins = delay, float(search.commanded(np.array(delay + half)))
-                before, after = (commands.after_sun_pulse(at, spacecraft.spin) for at in begins)
-                block = Block(channel.name, first, before[0], width, count, 1, before[1])
-                pairs.append((block, replace(block, delay=after[0], angle=after[1])))
+            if able and width + spacecraft.limits.gap <= half:
+                pairs += [
+                    tuple(
+                        Block(channel.name, first, delay, width, count, 1, angle)
+                        for delay, angle in opposite
+                    )
+                    for opposite in delays
+                ]
     pairs.sort(key=lambda pair: pair[0].count)
-    flights, pulses = search.flights, 0
-    for begin in range(0, len(pairs), PHASES):
-        some = pairs[begin : begin + PHASES]
-        pulses += sum(2 * block.count for block, _ in some)
-        if begin and (pulses > FLOWN_PULSES or work.exhausted()):
-            break
-        flights.fly(some, [0.0] * len(some))
-        if math.isfinite(flights.cheapest):
-            break
+    totals = accumulate(2 * pair[0].count for pair in pairs)
+    some = [pair for pair, total in zip(pairs, totals, strict=True) if total <= FLOWN_PULSES]
+    flights = search.flights
+    for begin in range(0, len(some), PHASES):
+        if not math.isfinite(flights.cheapest) and not work.exhausted():
+            batch = some[begin : begin + PHASES]
+            flights.fly(batch, [0.0] * len(batch))
     if not flights.of:
         return None
     chosen = flights.chosen()
+    shares = flights.shares(left_by(propagation.flown(spacecraft, chosen.schedule)))
+    shares.pop(Part.NUTATION, None)
+    if chosen.rank[0] or not all(map(requirements.complies, shares.values())):
+        return None
     scope = note("blocks-opposite", flown=len(flights.of))
     return chosen._replace(schedule=replace(chosen.schedule, notes=(scope,)))
-
-
-def _sets_spin(spacecraft: Spacecraft, flight: FlownSequence) -> bool:
-    """True where a flight keeps limits and bounds, but for a nutation that a further leg damps."""
-    shares = BlockFlights(spacecraft).shares(
-        left_by(propagation.flown(spacecraft, flight.schedule))
-    )
-    shares.pop(Part.NUTATION, None)
-    return not flight.rank[0] and all(map(requirements.complies, shares.values()))
 
 
 LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twice
@@ -323,9 +319,7 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
                     continue
                 try:
                     best = None if turning else opposite_blocks(leg, room)
-                    if best is None or not _sets_spin(leg, best):
-                        best = _searched(leg, room)
-                    legs.fire(best.schedule)
+                    legs.fire((best or _searched(leg, room)).schedule)
                 except Infeasible:
                     if number < 2:
                         raise

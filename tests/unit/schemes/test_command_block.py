@@ -32,6 +32,7 @@ from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import usual
+from nutdamp.planning.screening import first_pulses
 from nutdamp.schemes.block_model import (
     BlockModel,
     BlockState,
@@ -192,6 +193,7 @@ def test_interleaved_blocks_fire_as_one_of_half_their_spacing() -> None:
     whole, parts = fired(THEMIS, (one,)), fired(THEMIS, (odd, even))
     assert [pulse.t for pulse in parts] == [pulse.t for pulse in whole]
     assert parts.pulses_by_block == [[1, 3, 5, 7, 9], [0, 2, 4, 6, 8]]
+    assert [block.count for block in first_pulses(parts, 3).blocks] == [1, 2]
 
 
 @pytest.mark.parametrize(
