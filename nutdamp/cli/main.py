@@ -220,6 +220,7 @@ def look_of_screen() -> Iterator[None]:
 
 debug_option = click.option(
     "--debug",
+    hidden=True,  # named where it helps: beside an internal error
     is_flag=True,
     expose_value=False,
     callback=in_context(DEBUG),
