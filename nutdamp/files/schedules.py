@@ -180,6 +180,11 @@ STARTS = ("start_s", "t_s")
 
 AGREES = 1e-6  # relative difference up to which a torque is that of the torquer
 
+CONTRADICTS = 1e-3
+"""Share of torque, impulse or on-time by which a column must differ from what follows from start,
+on-time and channel to be named: files by hand have four digits.
+"""
+
 
 def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
     """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault
@@ -197,8 +202,8 @@ def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Sched
     for row in table.rows:
         pulse = _pulse(row, spacecraft, channels)
         if pulse is not None:
-            pulses.append((row.line, pulse))
-    for line, other in overlapping(pulses):
+            pulses.append((row, pulse))
+    for line, other in overlapping([(row.line, pulse) for row, pulse in pulses]):
         table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
     table.check()
     supply = Supply(spacecraft)
@@ -207,7 +212,25 @@ def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Sched
     supplied = tuple(supply.fire(pulse, channels.get(pulse.channel)) for _, pulse in pulses)
     if supply.shortage is not None:
         table.rows[-1].warn("tank", f"{supply.shortage}: the last pulses do not fire")
+    for (row, _), pulse in zip(pulses, supplied, strict=True):
+        if pulse.channel in channels and pulse.torque is not None:
+            _warn_of_contradictions(row, pulse, spacecraft.inertia.axes)
     return Schedule(supplied), table.warned
+
+
+def _warn_of_contradictions(row: Row, pulse: Pulse, axes: Vector) -> None:
+    """Name the columns of a row that say something else than its start, on-time and channel."""
+    assert pulse.torque is not None
+    values = {"t_s": pulse.t} if row.get("start_s") else {}
+    sizes = {"t_s": pulse.on_time}
+    for columns, vector in ((TORQUE, pulse.torque), (IMPULSE, pulse.impulse)):
+        values |= dict(zip(columns, (axes @ vector).tolist(), strict=True))
+        sizes |= dict.fromkeys(columns, float(np.linalg.norm(vector)))
+    for column, value in values.items():
+        stated = row.number(column) if row.get(column) else None
+        if stated is not None and abs(stated - value) > CONTRADICTS * sizes[column]:
+            rule = "start, on-time and channel rule"
+            row.warn(column, f"{column} {row[column]} is ignored, {value:.6g} follows: {rule}")
 
 
 def read_plan(
