@@ -298,6 +298,7 @@ class Diagnosis:
 
     rate: float  # at which z turns, rad/s
     growth: float  # of |z|, 1/s
+    spacecraft: Spacecraft | None = None  # whose disturbances move z, too
     failed: str | None = None  # channel of the last firing that did not help
     first: Glimpse | None = None  # what was first fired at since the loop was quiet
 
@@ -312,6 +313,7 @@ class Diagnosis:
         # A bias shows alike in both as far as z has not turned meanwhile.
         unsure = SIGMAS * doubt.noise + doubt.bias * min(self.rate * apart, 2.0)
         unsure += 2.0 * doubt.steps + (UNEVEN + doubt.scale) * before.size
+        unsure += self._pushed(before.time, after.time)
         wanted = min(acts, 2.0 * before.size - acts)  # more than |z| leaves what is left over
         taken = before.size - size
         if taken + unsure < -HELPS * wanted:
@@ -324,7 +326,22 @@ class Diagnosis:
                 return Ending.CHANNEL, failed
         allowed = (1.0 + FED) * first.size * self._grown(after.time - first.time)
         allowed += 2.0 * (SIGMAS * doubt.noise + doubt.bias + doubt.steps)
+        allowed += self._pushed(first.time, after.time)
         return (Ending.FED, channel) if self.failed is None and after.size > allowed else None
+
+    def _pushed(self, begin: float, end: float) -> float:
+        """Change of |z|, rad/s, that disturbances may make between two times, s; that of one which
+        turns otherwise than z beats.
+        """
+        if self.spacecraft is None:
+            return 0.0
+        total = 0.0
+        for each in self.spacecraft.disturbances:
+            lasts = max(min(end, each.end) - max(begin, each.begin), 0.0)
+            apart = abs(abs(self.rate) - abs(each.rate))
+            beat = 2.0 / apart if apart > 0.0 else lasts
+            total += abs(each.transverse) / self.spacecraft.inertia.A * min(lasts, beat)
+        return total
 
     def _grown(self, lasts: float) -> float:
         return math.exp(min(self.growth * lasts, LARGE))
@@ -423,7 +440,7 @@ class Pilot:
         self.loop = truth.loop or law.loop
         self.scatter = case.scatter
         self.until, self.free, self.down_to = until, free, down_to
-        self.diagnosis = Diagnosis(2.0 * math.pi / law.period, law.growth)
+        self.diagnosis = Diagnosis(2.0 * math.pi / law.period, law.growth, law.spacecraft)
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
         self.supply = Supply(truth)

@@ -333,6 +333,8 @@ def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     if impossible.
     """
     inertia = model.spacecraft.inertia
+    if spin == 0.0:
+        return {}
     if inertia.wheel == 0.0:
         wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
     else:  # of the A at which ω3 - H3/A is the rate

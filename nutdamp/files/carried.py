@@ -180,8 +180,7 @@ def _disturbance_edits(tree: Node, spacecraft: Spacecraft, time: float) -> Edits
     if len(going) < len(spacecraft.disturbances):
         nodes = (tree.get("disturbances", index) for index in going)
         entries = [node.plain() for node in nodes if node is not None]
-        # A step further in, since the entries of a block may stand as far left as its key.
-        yield Edit(("disturbances",), " " + json.dumps(entries, ensure_ascii=False))
+        yield Edit(("disturbances",), json.dumps(entries, ensure_ascii=False))
     shifted = disturbing_after(spacecraft.disturbances, time)
     for place, (index, new) in enumerate(zip(going, shifted, strict=True)):
         edits = list[tuple[KeyPath, float, str]]()

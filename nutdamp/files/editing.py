@@ -248,6 +248,7 @@ def edited(
 
 def _with(text: str, path: KeyPath, value: str) -> str:
     held: yaml.Node = _root(text)
+    indent = ""
     for depth, step in enumerate(path):
         key, node = _find(held, step)
         if node is None:
@@ -262,7 +263,11 @@ def _with(text: str, path: KeyPath, value: str) -> str:
                 f"{where} has the alias *{anchor[1]}: write that out, for it to be changed"
             )
         held = node
-    return text[: held.start_mark.index] + value + text[_end(held) :]
+        # The entries of a block may stand as far left as its key; a flow value may not.
+        indent = ""
+        if key is not None and node.start_mark.line > key.start_mark.line:
+            indent = "  " if node.start_mark.column <= key.start_mark.column else ""
+    return text[: held.start_mark.index] + indent + value + text[_end(held) :]
 
 
 def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:

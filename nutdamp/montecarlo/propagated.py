@@ -280,11 +280,6 @@ def fly(
     rates = rates.copy()
     quaternion = quaternion.copy()
     sun = in_body(spacecraft, cases.tilt, count, spacecraft.sun, cases.turn)
-    azimuth = np.full(count, spacecraft.sun_sensor.azimuth)
-    if cases.turn is not None:
-        towards = np.array([np.cos(azimuth), np.sin(azimuth)])
-        first, second = (np.sum(cases.turn[:2, axis] * towards, axis=0) for axis in (0, 1))
-        azimuth = np.arctan2(second, first)
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
     pulses = model.schedule.pulses
     begins = zip(model.schedule, cases.starts, cases.leads, strict=True)
@@ -299,7 +294,11 @@ def fly(
             bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows]
         )
         clock = SunPulseClock(
-            start, sun[:, rows], math.copysign(1.0, spacecraft.spin), azimuth[rows]
+            start,
+            sun[:, rows],
+            math.copysign(1.0, spacecraft.spin),
+            spacecraft.sun_sensor.azimuth,
+            None if cases.turn is None else cases.turn[:, :, rows],
         )
         sees_all = all(nominal)
         before = 0

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.attitude import angle_of_parts
+from nutdamp.physics.attitude import angle_of_parts, rotate
 from nutdamp.physics.energy_sink import damper
 from nutdamp.physics.motion import MotionStretch, advance, between_edges, polynomials
 from nutdamp.physics.series import Polynomial
@@ -335,18 +335,24 @@ class TorqueRamp(NamedTuple):
 class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
-    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad, (n,) or one, is that of the sensor
-    about axis 3 from axis 1, ``sense`` the sign of the spin. ``time`` (n,) s is that of the last
-    computed Sun pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to go
-    round. ``over`` (n,) s: end of the last pulse, command and thrust. ``moves`` counts steps of
+    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3
+    from axis 1, ``sense`` the sign of the spin. ``mount`` (3, 3, n) takes vectors in body axes to
+    those in which the sensor has its place; None: they are the same. ``time`` (n,) s is that of the
+    last computed Sun pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to
+    go round. ``over`` (n,) s: end of the last pulse, command and thrust. ``moves`` counts steps of
     Newton's method, ``looked_back`` those of them to Sun pulses under thrust.
     """
 
     def __init__(
-        self, start: MotionStretch, sun: Array, sense: float, azimuth: Array | float
+        self,
+        start: MotionStretch,
+        sun: Array,
+        sense: float,
+        azimuth: float,
+        mount: Array | None = None,
     ) -> None:
-        self.sun = np.vstack([sun, np.broadcast_to(azimuth, sun.shape[1])])
-        self.sense = sense
+        self.sun = sun if mount is None else np.vstack([sun, mount.reshape(9, -1)])
+        self.azimuth, self.sense = azimuth, sense
         self._stretches = [start]
         self._latest = start  # motion from which the next Sun pulse is looked for
         self.over = start.since
@@ -457,7 +463,10 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        return np.asarray(angle_of_parts(self.sense * _third_axis(here.quaternion), self.sun[:3]))
+        axis = _third_axis(here.quaternion)
+        if len(self.sun) > 3:
+            axis = rotate(here.quaternion.T, self.sun[9:].T).T
+        return np.asarray(angle_of_parts(self.sense * axis, self.sun[:3]))
 
     @property
     def _pace(self) -> Array:
@@ -535,7 +544,7 @@ class SunPulseClock:
 
     def _ahead(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
         """`_off` in [0, 2π)."""
-        return ahead(here.rates, here.quaternion, sun[:3], sun[3], self.sense)
+        return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
 
 
 def sun_direction(days: float) -> Array:
@@ -566,16 +575,16 @@ def sun_direction(days: float) -> Array:
 
 
 def ahead(
-    rates: Array, quaternion: Array, sun: Array, azimuth: Array | float, sense: float
+    rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float
 ) -> tuple[Array, Array]:
     """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its
     rate, rad/s.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a
-    `SunPulseClock`.
+    `SunPulseClock`, ``sun`` (3, n) or with the mount below it (12, n).
     """
     w, x, y, z = quaternion
-    s1, s2, s3 = sun
+    s1, s2, s3 = sun[:3]
     # The Sun as the body sees it: turned by the conjugate quaternion.
     i, j, k = z * s2 - y * s3, x * s3 - z * s1, y * s1 - x * s2
     s1, s2, s3 = (
@@ -584,6 +593,10 @@ def ahead(
         s3 + 2.0 * (w * k + y * i - x * j),
     )
     first, second, third = rates
+    if len(sun) > 3:
+        mount = sun[3:].reshape(3, 3, -1)
+        s1, s2, s3 = np.einsum("kan,an->kn", mount, np.array([s1, s2, s3]))
+        first, second, third = np.einsum("kan,an->kn", mount, rates)
     turning = s1 * (s3 * first - s1 * third) - s2 * (s2 * third - s3 * second)  # ds/dt = s × ω
     return sense * (np.arctan2(s2, s1) - azimuth) % (2.0 * math.pi), -sense * turning / (
         s1 * s1 + s2 * s2

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -195,13 +194,14 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if verdict.status.barred:
         single = spacecraft.commands is not None and not plan.pulses.blocks
         yield note("not-commandable" if single else "breaks-limits", scheme=plan.scheme)
-    last = max(spacecraft.edges, default=0.0)
-    if last > plan.pulses.end:
-        end = plan.reaching(last)
-        rates = end.motion(np.array([last]))[0][0]
-        inertia = replace(spacecraft.inertia, moments=end.last_moments)
-        angle = inertia.cones(rates, spacecraft.sense).nutation
-        yield note("disturbed-after", at_s=last, nutation_deg=math.degrees(angle))
+    disturbed = plan.disturbed
+    if disturbed is not None:
+        yield note(
+            "disturbed-after",
+            at_s=max(spacecraft.edges),
+            nutation_deg=math.degrees(disturbed.nutation),
+            off_deg=math.degrees(disturbed.aim),
+        )
     now = spacecraft.nutation
     limit = _limit_of(spacecraft, Part.NUTATION)
     if requirements.only_nutation(spacecraft):

@@ -14,7 +14,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, NotFound
 from nutdamp.flight import end_state, propagation
-from nutdamp.flight.end_state import left_on_the_way, seen_at
+from nutdamp.flight.end_state import left_by, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.verdict import Cases, JudgedCases, Verdict, judge_schedule, no_plan
 from nutdamp.schemes import catalogue, planner
@@ -166,10 +166,28 @@ class Plan(results.Data, results.Tabled):
         """Residual of the flight through the real pulse widths."""
         return self.flight.residual if self.feasible else None
 
+    @cached_property
+    def disturbed(self) -> Left | None:
+        """Residual when the last disturbance has begun or ended, where that is after the last
+        pulse.
+        """
+        last = max(self.spacecraft.edges, default=0.0)
+        if not self.feasible or last <= self.end:
+            return None
+        return left_by(seen_at(self.reaching(last), last))
+
     @property
     def left(self) -> Left | None:
-        """Flown residual for `requirements`."""
-        return left_on_the_way(self.flight, self.aspects) if self.feasible else None
+        """Flown residual for `requirements`; of nutation and distance the larger one of that and of
+        `disturbed`.
+        """
+        if not self.feasible:
+            return None
+        left, after = left_on_the_way(self.flight, self.aspects), self.disturbed
+        if after is None:
+            return left
+        nutation, aim = max(left.nutation, after.nutation), max(left.aim, after.aim)
+        return left._replace(nutation=nutation, aim=aim)
 
     @cached_property
     def commandable(self) -> bool:

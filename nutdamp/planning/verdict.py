@@ -274,7 +274,8 @@ class Verdict:
     @property
     def empties(self) -> bool:
         """True where cases fail though all bounds are kept in each: the tank runs empty."""
-        return self.met is False and self.tightest is not None and self.tightest.share == 1.0
+        kept = self.tightest is not None and self.tightest.share == 1.0
+        return self.met is False and self.nominally_met and kept
 
     @cached_property
     def causes(self) -> tuple[Cause, ...]:

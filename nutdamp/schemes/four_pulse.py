@@ -29,14 +29,22 @@ FILLED = 0.5
 MOST_FLOWN = 200  # pulses that are laid one by one on the true motion, at most
 
 
+LATER = 1.25
+"""End of a schedule without the channels that waste, over that with all, up to which it is taken
+where values are dispersed: errors of the moments of inertia grow with time. At 1.44 times 81 % of
+the cases complied in place of 91 %, at 2.3 times 95 % in place of all.
+"""
+
+
 def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     """Fire each channel whenever it opposes ω and firing helps, until it no longer does.
 
     Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at
     most J_min/(2A) where the rest is below the smallest pulse. The sign rule holds for both signs
     of a ω3. Channels that waste fire only what the others leave, unless that misses the nutation
-    required or takes more of ``options.least``. Raises Infeasible where no pulse fits or helps, or
-    ``options.on_time`` is not within a channel's bounds.
+    required, takes more of ``options.least`` or, in dispersed cases, ends much `LATER`. Raises
+    Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's
+    bounds.
     """
     channels = at_hand(spacecraft, usable(spacecraft))
     thrifty = without_waste(spacecraft, channels)
@@ -53,6 +61,9 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
         raise no_alignment(spacecraft, channels)
     enough = [builder.schedule() for builder in laid if _suffices(spacecraft, builder.nutation)]
     if enough:
+        soonest = min(schedule.end for schedule in enough)
+        if spacecraft.dispersions is not None:
+            enough = [schedule for schedule in enough if schedule.end <= LATER * soonest]
         return min(enough, key=lambda schedule: schedule.spent(options.least))
     return min(laid, key=lambda builder: builder.left).schedule()
 

@@ -380,6 +380,12 @@ class SourceFile(Protocol):
         """Spacecraft with keys of its file changed; raises FaultyFile or BadRequest."""
 
 
+LONG_BEAT = 20.0
+"""Inertial nutation periods after a disturbance begins within which its beat, of the period in the
+body, is looked for: that period is without end where the nutation stands still in the body.
+"""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Spacecraft(results.Data, results.Shown):
     """Spinning rigid body with its motion at t = 0 and its actuators.
@@ -523,9 +529,12 @@ class Spacecraft(results.Data, results.Shown):
 
     def watched_until(self, last: float) -> float:
         """Time up to which a flight is looked at whose pulses end at ``last`` s: a nutation period
-        after these and after the last disturbance begins or ends.
+        after these and after the last disturbance begins or ends, and after one that lasts the
+        period in the body, in which the nutation beats.
         """
-        return max([last, *self.edges]) + self.inertial_period
+        begun = max((each.begin for each in self.disturbances), default=0.0)
+        beat = min(self.body_period, LONG_BEAT * self.inertial_period) if begun > 0.0 else 0.0
+        return max(max([last, *self.edges]) + self.inertial_period, begun + beat)
 
     @property
     def torquer(self) -> Steerable | None:

@@ -409,7 +409,11 @@ def summary(
         if lines_of(shown := screen(*size)) <= LINES:
             return shown
     shown = screen(*SIZES[-1])
-    return shown if lines_of(shown, width=WIDE) <= FEWEST else Group(*_dense(shown))
+    if lines_of(shown, width=WIDE) <= FEWEST:
+        return shown
+    dense = [*_dense(shown)]
+    # Steps to take next are what is missed least.
+    return Group(*(dense if lines_of(Group(*dense), width=WIDE) <= FEWEST else dense[:-1]))
 
 
 def _dense(part: RenderableType) -> Iterator[RenderableType]:

@@ -51,8 +51,8 @@ def after(
     (0.49, None, None, 2),
     (0.49, 40.0, None, 4),  # two alone do not outdo the growth
     (0.49, 400.0, None, 2),
-    (0.49, None, 54.0, 4),  # nor end in time
-    (0.49, None, 56.0, 2),
+    (0.49, None, 108.0, 4),  # nor end in half the time
+    (0.49, None, 112.0, 2),
 ])  # fmt: skip
 def test_channels_that_waste_stay_off_unless_growth_or_horizon_needs_them(
     share: float, dissipation: float | None, horizon: float | None, firing: int

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.builders import noted, present
@@ -29,7 +30,7 @@ from nutdamp.estimation.results import carried, correlations, replaced
 from nutdamp.files.carried import fitted_text, later, notes
 from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.ccsds.write import merge
-from nutdamp.files.editing import parse_setting
+from nutdamp.files.editing import edited, parse_setting
 from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source, example_text, read_spacecraft
 from nutdamp.files.yaml import dotted, read_tree
@@ -764,3 +765,10 @@ def test_a_file_carried_on_holds_spin_axis_and_phase(of: str, inertia: str, spin
     assert {"spin_axis:", "phase:"} <= words
     assert words.isdisjoint({"quaternion:", "sun_phase:"})
     assert present(carried.attitude).epoch == "2026-03-01T12:00:10Z"
+
+
+def test_a_list_as_far_left_as_its_key_is_replaced_by_one_that_is_read() -> None:
+    """As ``yaml.safe_dump`` writes lists."""
+    text = "state:\n  omega0:\n  - 1\n  - 2\n  spin: 3\nsun:\n- 4\n- 5\nmass: 6\n"
+    after = yaml.safe_load(edited(text, {("state", "omega0"): "[7, 8]", ("sun",): "[9]"}))
+    assert after == {"state": {"omega0": [7, 8], "spin": 3}, "sun": [9], "mass": 6}

@@ -543,3 +543,23 @@ def test_disperse_shows_one_angle_of_the_nominal_case_and_no_warning_of_numpy(ru
     assert "ComplexWarning" not in shown.stderr
     least, largest = re.findall(r"axis from Star ✗ (\S+) deg at \S+ s to (\S+) deg", text)[0]
     assert f"{least} deg to {largest} deg in the nominal one." in text
+
+
+@pytest.mark.parametrize("turning", [{}, {"fixed_in": "inertial"}])
+def test_the_requirement_must_be_kept_after_the_last_disturbance_too(
+    turning: dict[str, str],
+) -> None:
+    """A body that spins steadily, and a burn that is over at 45 s."""
+    burn = {"torque": [20, 0, 0], "from": "10 s", "until": "45 s", **turning}
+    body = nutdamp.example().with_(
+        state={"spin": "30 rpm", "nutation": 0},
+        requirement={"nutation": "0.5 deg"},
+        disturbances=[burn],
+    )
+    plan = nutdamp.plan(body, scheme="none")
+    after = present(plan.disturbed)
+    assert plan.end == 0.0
+    assert after.nutation == pytest.approx(plan.fly(60.0).residual.nutation, abs=1e-9)
+    assert plan.meets_requirement is (after.nutation <= math.radians(0.5))
+    held = next(line for line in plan.held if line.bound.part is Part.NUTATION)
+    assert held.left == after.nutation
