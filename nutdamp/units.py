@@ -192,7 +192,10 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
     expected = KINDS[kind]
     if _DECIMAL_COMMA.fullmatch(text):
         point = shown(text.replace(",", "."))
-        raise ValueError(f"{shown(text)} has a decimal comma; write {point}, with a decimal point")
+        cure = f"{point}, with a decimal point"
+        if re.search(r",\d{3}(\D|$)", text):  # or one between thousands, as in 1,250 kg
+            cure += f", or {shown(text.replace(',', ''))}"
+        raise ValueError(f"{shown(text)} has a decimal comma; write {cure}")
     hours = re.fullmatch(HOURS, text.strip()) if kind == "right ascension" else None
     if hours is not None:
         minutes = float(hours[2]) + float(hours[4] or 0.0) / 60.0

@@ -416,3 +416,16 @@ def test_the_command_verify(run: Process, tmp_path: Path) -> None:
     assert (written["agree"], len(written["firings"])) == (True, 3)
     assert run("verify", "craft.yaml", "--loop", "--scheme", "none").returncode == 2
     assert run("verify", "--loop").returncode == 2
+
+
+@pytest.mark.parametrize("newton_metres", [1.0, 8.0])
+@pytest.mark.parametrize("wired_wrong", [False, True])
+def test_a_burn_is_no_fault_of_sensor_or_channels(
+    newton_metres: float, *, wired_wrong: bool
+) -> None:
+    """It adds more nutation than a firing takes off, for ten seconds."""
+    burn = Disturbance(complex(newton_metres), begin=10.0, end=20.0)
+    body = replace(fired_by(0.1, FOUR, limits=Limits(horizon=120.0)), disturbances=(burn,))
+    loop = fires(Sensor(scale=-1.0) if wired_wrong else Sensor(), 0.3, 0.05)
+    run = fly(body, loop, 120.0)
+    assert run.stop is (Ending.SENSOR if wired_wrong else Ending.END)

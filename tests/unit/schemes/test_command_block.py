@@ -28,6 +28,9 @@ from nutdamp.flight.cones import aspects
 from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.end_state import left_by
 from nutdamp.physics import attitude, motion, precession
+from nutdamp.physics.motion import MotionStretch
+from nutdamp.physics.series import Bodies
+from nutdamp.physics.sky import SunPulseClock
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
@@ -627,6 +630,30 @@ def test_without_nutation_a_sun_pulse_comes_every_turn_and_in_no_view_none() -> 
     for key, body, count in cases:
         with refused(Infeasible, f"blocks.no-sun-pulse-{key}"):
             fired(body, (Block("+1", 1, 0.1, 0.1, count),))
+
+
+def test_a_sensor_stays_in_the_body_whatever_its_principal_axes_are() -> None:
+    """Of a sphere all axes are principal ones: those of the sensor tell when the Sun passes it."""
+    moments = np.full((3, 1), 50.0)
+    rates, quaternion = np.array([[0.3], [-0.2], [2.0]]), np.array([[0.9], [0.1], [-0.3], [0.2]])
+    quaternion = quaternion / np.linalg.norm(quaternion)
+    sun = (SUN / np.linalg.norm(SUN))[:, None]
+    turn = attitude.unit(np.array([0.95, 0.1, 0.2, -0.15]))
+    mount = attitude.matrix(turn)
+    turned = attitude.multiply(quaternion[:, 0], turn)[:, None]
+    bodies = Bodies(moments, np.zeros(3))
+    plain = SunPulseClock(MotionStretch(bodies, np.zeros(1), rates, quaternion), sun, 1.0, 0.4)
+    other = SunPulseClock(
+        MotionStretch(bodies, np.zeros(1), mount.T @ rates, turned),
+        sun,
+        1.0,
+        0.4,
+        mount[:, :, None],
+    )
+    for number in (1, 2, 7):
+        one, two = (clock.sun_pulse(number) for clock in (plain, other))
+        assert two.since == pytest.approx(one.since, abs=1e-9)
+        assert other.angle(two) == pytest.approx(plain.angle(one), abs=1e-9)
 
 
 def test_sun_pulses_seen_one_by_one_are_those_seen_at_once_for_the_work_of_one_flight(
