@@ -298,7 +298,7 @@ class Diagnosis:
 
     rate: float  # at which z turns, rad/s
     growth: float  # of |z|, 1/s
-    spacecraft: Spacecraft | None = None  # whose disturbances move z, too
+    spacecraft: Spacecraft  # whose disturbances move z, too
     failed: str | None = None  # channel of the last firing that did not help
     first: Glimpse | None = None  # what was first fired at since the loop was quiet
 
@@ -333,8 +333,6 @@ class Diagnosis:
         """Change of |z|, rad/s, that disturbances may make between two times, s; that of one which
         turns otherwise than z beats.
         """
-        if self.spacecraft is None:
-            return 0.0
         total = 0.0
         for each in self.spacecraft.disturbances:
             lasts = max(min(end, each.end) - max(begin, each.begin), 0.0)

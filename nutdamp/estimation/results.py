@@ -279,10 +279,15 @@ def correlations(
     estimate: Carried, dispersions: Dispersions | None
 ) -> tuple[tuple[str, str, float], ...]:
     """Correlations by pairs of inputs, rounded as in files, positive definite; ``dispersions`` of
-    others stay.
+    others stay. A and C are no inputs beside the whole tensor.
     """
     matrix = estimate.correlation
-    uncertain = [index for index, sigma in enumerate(estimate.sigmas) if sigma > 0.0]
+    tensor = dispersions is not None and dispersions.inertia_tensor is not None
+    uncertain = [
+        index
+        for index, (name, sigma) in enumerate(zip(estimate.names, estimate.sigmas, strict=True))
+        if sigma > 0.0 and not (tensor and name in ("A", "C"))
+    ]
     rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[
         np.ix_(uncertain, uncertain)
     ]

@@ -173,6 +173,8 @@ def _spelling(
                 cure = "merge keys are of YAML 1.1; write the keys out"
             elif ":" in key:
                 cure = "put a space behind the colon"
+            elif key[:1].isdigit():
+                cure = "decimals take a point, not a comma"
             yield Finding((*path, key), f"unknown key; {cure}", at_key=True)
     for step, child in node.children():
         annotation = fields[step].type if isinstance(step, str) and fields and not named else model

@@ -460,7 +460,7 @@ class RealWidths:
             over = np.max(pulses.edges, axis=0, initial=0.0)
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
-            watch.turn(MotionStretch(last, over, settled, turned))
+            watch.turn(MotionStretch(last, over, settled, turned), spacecraft.beats_until)
         momentum = triple(last.momentum(settled))
         after = cases.of_estimate(carried(tuple(turned), momentum))
         nutation = None

@@ -127,13 +127,14 @@ class AxisWatch:
         else:
             self._slow(here, duration)
 
-    def turn(self, here: MotionStretch) -> None:
+    def turn(self, here: MotionStretch, until: float = 0.0) -> None:
         """Record a motion free of pulses: one turn of the axis about H, behind the last edge of a
-        torque.
+        torque, and to ``until`` s at least.
         """
         first, second, _ = here.bodies.moments
         wait = np.maximum(max(here.bodies.forcing.edges, default=0.0) - here.since, 0.0)
-        self.motion(here, wait + CIRCLE * 0.5 * (first + second) / _momentum(here))
+        turned = wait + CIRCLE * 0.5 * (first + second) / _momentum(here)
+        self.motion(here, np.maximum(turned, until - here.since))
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
         np.minimum.at(self.least[number], self.rows[cases], least)  # a case may come twice

@@ -529,12 +529,19 @@ class Spacecraft(results.Data, results.Shown):
 
     def watched_until(self, last: float) -> float:
         """Time up to which a flight is looked at whose pulses end at ``last`` s: a nutation period
-        after these and after the last disturbance begins or ends, and after one that lasts the
-        period in the body, in which the nutation beats.
+        after these and after the last disturbance begins or ends, and `beats_until`.
+        """
+        return max(max([last, *self.edges]) + self.inertial_period, self.beats_until)
+
+    @property
+    def beats_until(self) -> float:
+        """Time, s, at which the nutation has gone through its beat, of the period in the body,
+        under the last disturbance that begins after t = 0; 0 without one.
         """
         begun = max((each.begin for each in self.disturbances), default=0.0)
-        beat = min(self.body_period, LONG_BEAT * self.inertial_period) if begun > 0.0 else 0.0
-        return max(max([last, *self.edges]) + self.inertial_period, begun + beat)
+        if begun <= 0.0:
+            return 0.0
+        return begun + min(self.body_period, LONG_BEAT * self.inertial_period)
 
     @property
     def torquer(self) -> Steerable | None:

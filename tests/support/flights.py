@@ -162,16 +162,14 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
 
 
 def in_own_axes(spacecraft: Spacecraft, own: Array) -> Spacecraft:
-    """The spacecraft with vectors in other body axes, the columns of ``own`` (3, 3)."""
+    """The spacecraft with vectors in other body axes, the columns of ``own`` (3, 3), but for its
+    Sun sensor.
+    """
 
     def disturbance(one: Disturbance) -> Disturbance:
         x, y, z = np.array([one.transverse.real, one.transverse.imag, one.axial]) @ own
         return replace(one, transverse=complex(x, y), axial=float(z))
 
-    sensor = spacecraft.sun_sensor
-    if sensor is not None:
-        x, y, _ = np.array([math.cos(sensor.azimuth), math.sin(sensor.azimuth), 0.0]) @ own
-        sensor = replace(sensor, azimuth=math.atan2(y, x))
     channels = [
         one.of(torque=one.torque @ own) if one.thrusters else one for one in spacecraft.channels
     ]
@@ -179,7 +177,6 @@ def in_own_axes(spacecraft: Spacecraft, own: Array) -> Spacecraft:
         spacecraft,
         channels=tuple(channels),
         disturbances=tuple(map(disturbance, spacecraft.disturbances)),
-        sun_sensor=sensor,
     )
 
 

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from support.builders import noted, present
 from support.cases import spread
 from support.contract import BASE, THRUSTERS
+from support.dispersed import normal
 from support.golden import check_text, refusal
 from support.places import case
 from support.process import Run
@@ -38,6 +39,7 @@ from nutdamp.flight.dynamics import supplied
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions
 
 EXAMPLE = example_text()
 
@@ -488,6 +490,9 @@ def test_the_file_holds_all_that_is_known_now() -> None:
         {"T1": 0.01 / 0.96, "T 2": 1e-7 / 1.05, "T3": 0.02}, rel=1e-5
     )
     assert spread.correlation == correlations(known, body.dispersions)
+    # A file of the whole tensor has no inputs of the names A and C.
+    drawn = correlations(known, Dispersions(inertia_tensor=normal(0.01, relative=True)))
+    assert drawn == tuple(pair for pair in spread.correlation if not {"A", "C"} & {*pair[:2]})
     assert re.findall("#.*", text) == re.findall("#.*", FILE)
     units = "kg m^2", "rpm", "deg", "N", "N m", "ms"
     assert [bool(re.search(rf"[\d.] {re.escape(unit)}\b", text)) for unit in units] == [True] * 6

@@ -563,3 +563,18 @@ def test_the_requirement_must_be_kept_after_the_last_disturbance_too(
     assert plan.meets_requirement is (after.nutation <= math.radians(0.5))
     held = next(line for line in plan.held if line.bound.part is Part.NUTATION)
     assert held.left == after.nutation
+
+
+def test_the_largest_nutation_under_a_torque_that_lasts_is_that_of_its_beat() -> None:
+    """From rest it goes to twice the steady tilt M1/|ν|A of ω in half a period of the body."""
+    body = nutdamp.example().with_(
+        state={"spin": "30 rpm", "nutation": 0},
+        disturbances=[{"torque": [2, 0, 0], "from": "10 s"}],
+        requirement={"nutation_during": "30 deg"},
+    )
+    inertia = body.inertia
+    across = 2.0 * 2.0 / (abs(body.nutation_rate) * inertia.A)
+    most = math.atan(inertia.A * across / (inertia.C * body.spin))
+    plan = nutdamp.plan(body, scheme="none")
+    (way,) = [line for line in plan.held if line.bound.keep is not None]
+    assert way.left == pytest.approx(most, rel=1e-6)

@@ -17,6 +17,7 @@ from support import dispersed, places, reference
 from support.builders import cross, present, spinner
 from support.cases import deep, spread
 from support.commands import rows as rows_of
+from support.dispersed import normal
 from support.flights import BODY_ERRORS, axis_path, by_blocks, flown_outputs, realised, timed
 from support.process import Run
 from support.spinners import commanded, flown_by_reference
@@ -36,7 +37,7 @@ from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import decision, robust
 from nutdamp.planning import plan as planning
 from nutdamp.schemes.block_model import fired
-from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
+from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor, firings
 from nutdamp.spacecraft.model import Disturbance, Inertia, Keep, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -334,7 +335,6 @@ BLOCKS = {
     "interleaved": by_blocks(interleaved=True),
     "a wheel": dispersed.wheeled(by_blocks(spin=1.3), 60.0),
     "disturbances": by_blocks(disturbances=(Disturbance(0.02 + 0.01j, 0.03), LEAKS[1])),
-    "tensors": dispersed.tensors(by_blocks(spin=1.3)),
     "a disturbance with an end": by_blocks(
         spin=1.3, disturbances=(Disturbance(0.3 + 0.1j, 0.03, begin=6.0, end=40.0),)
     ),
@@ -354,6 +354,30 @@ def test_each_case_fires_its_blocks_as_its_own_body_alone(name: str) -> None:
         starts = np.array([pulse.start for pulse in fired(true, model.schedule.blocks)])
         assert np.array([start[case] for start in own.starts]) == pytest.approx(starts, abs=1e-9)
         assert np.abs(starts - planned).max() > 0.05  # at planned times they would be elsewhere
+        assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
+
+
+def test_the_sun_sensor_of_a_drawn_tensor_stays_in_the_axes_of_the_file() -> None:
+    """At each Sun pulse the Sun has the azimuth of the sensor in these, not in the principal axes
+    of the case.
+    """
+    blocks = by_blocks(spin=1.3)
+    spread_ = Dispersions(inertia_tensor=normal(0.01, relative=True))
+    model = DispersedModel(replace(blocks.spacecraft, dispersions=spread_), blocks.schedule)
+    sensor, sun = present(model.spacecraft.sun_sensor), present(model.spacecraft.sun)
+    draws = dispersed.first_cases(Study(model), 15)
+    flown = outputs(RealWidths, model, draws)
+    turns = model.cases(draws).turn
+    for case in (0, 7, 14):
+        one = dispersed.one_of(draws, case)
+        true, made = realised(model, one)
+        path = propagation.flown(true, made, made.end)
+        for pulse, (_, _, block) in zip(made, firings(model.schedule.blocks), strict=True):
+            _, (quaternion,) = path.motion(np.array([pulse.start - block.delay]))
+            own = attitude.rotate(quaternion * (1.0, -1.0, -1.0, -1.0), sun)
+            x, y, _ = turns[:, :, case] @ own
+            off = math.remainder(math.atan2(y, x) - sensor.azimuth, 2.0 * math.pi)
+            assert off == pytest.approx(0.0, abs=1e-8)
         assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
 
 
@@ -507,15 +531,19 @@ MODELS = {
     "burn after the pulses": with_directions(
         JETS, disturbances=(Disturbance(2.0 + 0.5j, begin=20.0, end=24.0),)
     ),
+    "torque that lasts": with_directions(JETS, disturbances=(Disturbance(-2.0 + 0j, begin=20.0),)),
     "blocks": with_directions(by_blocks()),
 }
 
 
 def end_of(made: propagation.Flight) -> float:
-    """When the axis has gone round H once more after the last pulse and the last disturbance."""
+    """When the axis has gone round H once more after the last pulse and the last disturbance, and
+    the nutation through its beat.
+    """
     size = float(np.linalg.norm(made.settled.rates * np.asarray(made.moments)))
     last = max([made.schedule.end, *made.spacecraft.edges])
-    return last + math.pi * (made.moments[0] + made.moments[1]) / size
+    turned = last + math.pi * (made.moments[0] + made.moments[1]) / size
+    return max(turned, made.spacecraft.beats_until)
 
 
 def seen_in(model: DispersedModel, draws: dict[str, np.ndarray]) -> np.ndarray:
