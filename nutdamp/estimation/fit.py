@@ -56,6 +56,7 @@ from nutdamp.estimation.search import (
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft
 
+QUIET = 2  # samples after the last pulse within which a damped motion falls still, at most
 FEWEST = 20  # number of samples that are alike in a row where a sensor is stuck, at least
 COARSE = 10  # a record that has so few different values is one of coarse steps
 NOTHING = 1e-12  # times the usual size of a signal below which it shows 0
@@ -83,6 +84,9 @@ def expect_alive(model: Model) -> tuple[str, ...]:
     # Gyros without noise show a spin so; everything else that does not change is a sensor that is
     # off.
     steady = {*GYROS} == constant == {*shown} and moves <= spins and bool(spins)
+    # Nor does what would show a nutation, of a body that has none by its file.
+    still = model.spacecraft.transverse_rate == 0.0 and not moves & {*GYROS[:2]}
+    last_pulse = max((pulse.over for pulse in model.record.schedule), default=-math.inf)
     faults = []
     for name, (times, values) in shown.items():
         edges = np.concatenate(
@@ -91,11 +95,13 @@ def expect_alive(model: Model) -> tuple[str, ...]:
         at, alike = int(np.argmax(np.diff(edges))), int(np.diff(edges).max())
         begins, ends = times[edges[at]], times[edges[at + 1] - 1]
         at_an_end = _at_an_end(values)
+        # What pulses have damped is as still without noise.
+        damped = begins - QUIET * float(np.median(np.diff(times))) <= last_pulse <= begins
         # That gyro 3 does not change all along is as it should be.
         off = (
-            not steady and name not in spins
+            not steady and not still and name not in spins
             if name in constant
-            else len(np.unique(values, axis=0)) > COARSE
+            else len(np.unique(values, axis=0)) > COARSE and not damped
         )
         if name in KIND and np.mean(absurd(model.spacecraft, name, values)) > BROKEN:
             faults.append(
@@ -105,7 +111,7 @@ def expect_alive(model: Model) -> tuple[str, ...]:
             faults.append(
                 f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)"
             )
-        elif at_an_end > SATURATED and name not in spins:
+        elif at_an_end > SATURATED and name not in spins and not damped:
             share = 100.0 * at_an_end
             faults.append(f"{name} is at its largest or least value in {share:.3g} % of samples")
     if faults:
@@ -421,7 +427,8 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     if constant := expect_alive(model):
         return _steady(Model(spacecraft, record, growing=False), constant)
     fitted = _settled(model, _best(model))
-    _expect_seen(fitted)
+    if not _sees_nutation(fitted):
+        return _without_nutation(fitted)
     fitted = initial_guess.likeliest(
         [
             fitted,
@@ -462,7 +469,15 @@ def _steady(model: Model, constant: tuple[str, ...]) -> Fit:
     told = np.concatenate([scaled, model.prior[0]]).any(axis=0)
     covariance = np.where(np.outer(told, told), covariance_of(model, scaled), 0.0)
     return Fit(
-        model, values, covariance, noise, used, residuals(model, values), slopes, constant=constant
+        model,
+        values,
+        covariance,
+        noise,
+        used,
+        residuals(model, values),
+        slopes,
+        steady=True,
+        constant=constant,
     )
 
 
@@ -565,21 +580,43 @@ def _widened(narrow: Fit, wider: Model, more: Sequence[str]) -> Fit:
     return _settled(wider, values)
 
 
-def _expect_seen(fitted: Fit) -> None:
-    """Raise Infeasible where there is no nutation in the record."""
+def _sees_nutation(fitted: Fit) -> bool:
+    """True where there is a nutation in the record.
+
+    Raises Infeasible where there is none, and the file has one that would be seen.
+    """
     at = _places(fitted.model, ("omega_1", "omega_2"))
     omega, across = fitted.values[at], fitted.covariance[np.ix_(at, at)]
     # Its size counts: where the phase is hardly known, the rate across it is not either.
     size = float(np.linalg.norm(omega))
     way = omega / size if size > 0.0 else np.array([1.0, 0.0])
     sigma = 1.0 / math.sqrt(float(way @ np.linalg.pinv(across, hermitian=True) @ way))
-    if size < SEEN * sigma:
+    seen = size >= SEEN * sigma
+    if not seen:
         expect_explained(fitted)
-        raise Infeasible(
-            f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, "
-            "within the noise; "
-            "a longer record, less noise or a larger nutation (a probe pulse) helps"
-        )
+        if fitted.model.spacecraft.transverse_rate >= SEEN * sigma:
+            raise Infeasible(
+                f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, "
+                "within the noise, and the file has more; set state.nutation: 0 deg if the body "
+                "spins steadily, else check the sensors; less noise or a probe pulse helps too"
+            )
+    return seen
+
+
+def _without_nutation(fitted: Fit) -> Fit:
+    """The fit of a steady spin: spin and axis; C/A and dissipation, which it does not show, are
+    those of the file.
+    """
+    model = Model(fitted.model.spacecraft, fitted.model.record, growing=False, steady=True)
+    values = _begun(fitted, model)
+    ratio = _places(model, (RATIO,))
+    values[ratio] = [model.parameters[at].file for at in ratio]
+    steady = _settled(model, values)
+    covariance = steady.covariance.copy()
+    # Without a tolerance in the file C/A is as exact as there.
+    if any(each.name == RATIO and math.isinf(each.prior) for each in fitted.model.parameters):
+        covariance[ratio] = covariance[:, ratio] = 0.0
+    return replace(steady, covariance=covariance, steady=True)
 
 
 def _best(model: Model) -> Vector:

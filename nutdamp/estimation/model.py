@@ -22,7 +22,9 @@ from nutdamp.estimation.parameters import (
     CROSSING,
     DIRECTION,
     KIND,
+    RATIO,
     SUN_ASPECT,
+    UNSAID,
     Parameter,
     Record,
     Sighting,
@@ -95,9 +97,10 @@ class Model:
         *,
         unequal: bool | None = None,
         growing: bool = True,
+        steady: bool = False,
     ) -> None:
         """``unequal``: with I1 ≠ I2, as the file has it where that is not said; ``growing``: κ is
-        estimated.
+        estimated; ``steady``: no nutation shows C/A, which stays at the file's.
         """
         _expect_described(spacecraft, record)
         self.spacecraft, self.record = spacecraft, record
@@ -108,6 +111,13 @@ class Model:
         self.parameters = tuple(
             parameters(spacecraft, record, unequal=self.unequal, growing=growing)
         )
+        if steady:
+            self.parameters = tuple(
+                each._replace(prior=min(each.prior, UNSAID * each.file))
+                if each.name == RATIO
+                else each
+                for each in self.parameters
+            )
         self.prior = prior(spacecraft, self.parameters)
         self.pulses = self._pulses()
         kinds = record.kinds

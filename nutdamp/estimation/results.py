@@ -30,6 +30,7 @@ from nutdamp.estimation.parameters import (
     GYROS,
     RATIO,
     SEEN,
+    UNSAID,
     Matrix,
     Record,
     Values,
@@ -352,8 +353,10 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         x, y, _ = inertia.axes @ state.rates
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
         sense = math.copysign(1.0, inertia.axial(state.spin))
-        nutation = inertia.cones(state.rates, sense).nutation
-        return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
+        # |ω| by its part along ω as estimated: at no nutation |ω| has no derivative.
+        along = x * math.cos(phase0) + y * math.sin(phase0)
+        nutation = math.copysign(inertia.cones(state.rates, sense).nutation, along)
+        return np.array([state.spin, nutation, along, phase0 + turned])
 
     omega = complex(*spacecraft.rates[:2])
     # Carried to another time the phase is not comparable with that of the file.
@@ -370,7 +373,7 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         rows, _each(fitted, motion), strict=True
     ):
         shown = sigma if key != "phase" or model.record.shows_turn else math.inf
-        if key != "phase" or not fitted.constant:  # without nutation there is none
+        if key != "phase" or not fitted.steady:  # without nutation there is none
             yield Estimate(key, label, unit, 1.0 / DEG, value, shown, file, prior)
 
 
@@ -494,7 +497,6 @@ FAR, REFUSED = (
     3.0,
     5.0,
 )  # sigmas of the file by which a constant is off that is said, and that is not accepted
-UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the file gives none
 OTHER_SPIN = 0.01  # part by which a spin is off that is said
 
 
@@ -522,15 +524,16 @@ def spin_off(fitted: Fit) -> tuple[float, float] | None:
 
 
 def refused(fitted: Fit) -> bool:
-    """True where an estimate is not accepted: constants much too far from the file, H turned, or
-    wrong columns.
+    """True where an estimate is not accepted: constants much too far from the file, H turned, wrong
+    columns, or a search that ended before residuals were noise.
     """
     # A bias belongs to the sensor, and what the file says of it is usual, not of this one.
     far = any(not row.key.startswith("bias") for row, _ in far_from_file(fitted, REFUSED))
     model = fitted.model
     # Of a mirrored record the mirrored motion is as likely, with H the other way.
     turned = model.body(fitted.named).sense != model.spacecraft.sense
-    return far or turned or bool(fitted.causes)
+    unfinished = not fitted.finished and bool(_coloured(fitted))
+    return far or turned or unfinished or bool(fitted.causes)
 
 
 TURNED = {AXIS[1]: "axis_y, or of the right ascension,", AXIS[2]: "axis_z, or of the declination,",
@@ -671,6 +674,8 @@ def doubts(fitted: Fit) -> Iterator[Note]:
         yield note("fit-refused")
     if fitted.constant:
         yield note("signal-constant", signals=", ".join(fitted.constant))
+    elif fitted.steady:
+        yield note("nutation-not-seen")
     if fitted.coarse:
         yield note("fit-coarse", signals=", ".join(fitted.coarse))
     if initial_guess.too_slow(model, fitted.values):
@@ -688,13 +693,18 @@ def doubts(fitted: Fit) -> Iterator[Note]:
         yield note("fit-pulses-outside", outside=outside, pulses=len(record.schedule), **span)
 
 
-def _of_residuals(fitted: Fit) -> Iterator[Note]:
-    """Possible cause of residuals that are not white, and the cure."""
-    coloured = [
+def _coloured(fitted: Fit) -> list[int]:
+    """Numbers of the signals with residuals that are not white."""
+    return [
         index
         for index in range(len(fitted.model.signals))
         if fitted.resolved[index] and not fitted.white(index)
     ]
+
+
+def _of_residuals(fitted: Fit) -> Iterator[Note]:
+    """Possible cause of residuals that are not white, and the cure."""
+    coloured = _coloured(fitted)
     if not coloured:
         return
     signals = ", ".join(fitted.model.signals[index] for index in coloured)

@@ -281,7 +281,8 @@ class Fit:
     residuals: Vector  # (m,) measured less predicted
     jacobian: Matrix  # (m, p)
     finished: bool = True  # unless the search ended with its budget of work
-    constant: tuple[str, ...] = ()  # signals of a steady spin, which do not change
+    steady: bool = False  # a spin without nutation
+    constant: tuple[str, ...] = ()  # signals of one that do not change at all
     coarse: tuple[str, ...] = ()  # signals with steps that are large beside their noise
     causes: tuple[
         str, ...

@@ -511,7 +511,8 @@ class SunPulseClock:
         pending = np.ones(count, dtype=bool) if wanted is None else wanted.copy()
         # A pulse more than half a turn off is lost. Under thrust Newton's steps may go on for
         # hundreds of radians: a plan of blocks took 75 s so, and 15 s within a turn.
-        earliest, latest = start.since - HALF / pace, start.since + HALF / pace
+        low, high = start.since - HALF / pace, start.since + HALF / pace
+        begun, ended = np.zeros((2, count), dtype=bool)  # where the motion at low, high is known
         for _ in range(ITERATIONS):
             rows = np.flatnonzero(pending)
             if not len(rows):
@@ -521,12 +522,23 @@ class SunPulseClock:
             rows = rows if few else np.arange(count)
             some = here.some(rows) if few else here
             off, rate = self._off(some, sun[:, rows], behind[rows])
+            apart = np.abs(off) >= CIRCLE * EXACT
+            later = off > 0.0
+            low[rows] = np.where(later, some.since, low[rows])
+            high[rows] = np.where(later, high[rows], some.since)
+            begun[rows] |= later
+            ended[rows] |= ~later
             # Where the Sun is near the axis its azimuth may not change for a moment: then by the
-            # mean rate.
+            # mean rate. Where it turns back Newton's steps go to and fro for ever: bisection ends.
             time = some.since + off / np.where(rate > 0.1 * pace[rows], rate, pace[rows])
-            moved = some.moved(np.clip(time, earliest[rows], latest[rows]))
+            time = np.clip(time, low[rows], high[rows])
+            stuck = np.where(
+                later, ended[rows] & (time == high[rows]), begun[rows] & (time == low[rows])
+            )
+            time = np.where(apart & stuck, 0.5 * (low[rows] + high[rows]), time)
+            moved = some.moved(time)
             self.moves += 1
-            pending[rows] &= (np.abs(off) >= CIRCLE * EXACT) & (moved.since != some.since)
+            pending[rows] &= apart & (moved.since != some.since)
             if few:
                 for whole, part in zip(here[1:4], moved[1:4], strict=True):
                     whole[..., rows] = part

@@ -48,9 +48,9 @@ LOOKED_BACK = 2.0
 stage that is pushed for a turn and more took 5 s of which nothing was charged.
 """
 
-USUAL, MOVED = 8, 1.5
+USUAL, MOVED = 8, 0.7
 """Steps of Newton's method to a Sun pulse of flights that are integrated, beyond which each takes
-`work`, and units of it: where dissipation lets the nutation grow past 60 deg a search took 24 s of
+`work`, and units of it: where dissipation lets the nutation grow past 60 deg a search took 14 s of
 which 9 s were charged.
 """
 
