@@ -76,6 +76,7 @@ class Ends:
         None  # least and largest angle from spin axis to each cone on the way, (m, 2, n) rad
     )
     drained: Cases = 0.0  # as of `cases.supplied`
+    disturbed: Ends | None = None  # when the last disturbance has begun or ended, if later
 
 
 @dataclass(frozen=True, eq=False)
@@ -412,7 +413,8 @@ class RealWidths:
             (FAR * row.sigma for row in self.model.inputs.drawn if row.name.startswith("timing")),
             default=0.0,
         )
-        lasts = self.model.schedule.end + late * len(self.model.schedule)
+        edges = self.model.spacecraft.edges
+        lasts = max(self.model.schedule.end + late * len(self.model.schedule), *edges, 0.0)
         in_steps = min(float(np.sum(self.model.on_times)), lasts) if arcs else lasts
         turned = float(np.linalg.norm(rates)) * in_steps
         looks = turned * sky.ROWS / sky.CIRCLE if self.model.spacecraft.keep else 0.0
@@ -461,23 +463,33 @@ class RealWidths:
         last = bodies if sheds is None else bodies.lighter(sheds.sum(axis=0))
         if watch is not None:
             watch.turn(MotionStretch(last, over, settled, turned), spacecraft.beats_until)
-        momentum = triple(last.momentum(settled))
-        after = cases.of_estimate(carried(tuple(turned), momentum))
-        nutation = None
-        if not np.array_equal(last.moments[0], last.moments[1]):
-            nutation = widest_cones(last.moments, settled, spacecraft.sense, last.forcing.wheel)[0]
-        return Ends(
-            momentum=cases.untwisted(momentum),
-            before=cases.of_estimate(triple(bodies.momentum(rates))),
-            after=after,
-            pointed=rotated(after, cases.tilt),
-            spin=settled[2],
-            spin_change=settled[2] - rates[2],
-            propellant=propellant,
-            nutation=nutation,
-            aspects=None if watch is None else watch.angles,
-            drained=cases.drained,
-        )
+        before = cases.of_estimate(triple(bodies.momentum(rates)))
+
+        def ends(here: MotionStretch, disturbed: Ends | None) -> Ends:
+            momentum = triple(last.momentum(here.rates))
+            after = cases.of_estimate(carried(tuple(here.quaternion), momentum))
+            nutation = None
+            if not np.array_equal(last.moments[0], last.moments[1]):
+                wheel = last.forcing.wheel
+                nutation = widest_cones(last.moments, here.rates, spacecraft.sense, wheel)[0]
+            return Ends(
+                momentum=cases.untwisted(momentum),
+                before=before,
+                after=after,
+                pointed=rotated(after, cases.tilt),
+                spin=here.rates[2],
+                spin_change=here.rates[2] - rates[2],
+                propellant=propellant,
+                nutation=nutation,
+                aspects=None if watch is None else watch.angles,
+                drained=cases.drained,
+                disturbed=disturbed,
+            )
+
+        here = MotionStretch(last, over, settled, turned)
+        edge = max(spacecraft.edges, default=0.0)
+        later = ends(here.moved(np.maximum(over, edge)), None) if np.any(over < edge) else None
+        return ends(here, later)
 
     def _bodies(self, moments: Array, wheel: Cases, turn: Any = None) -> Bodies:
         torques = torques_of(self.model.spacecraft)

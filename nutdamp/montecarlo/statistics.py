@@ -63,6 +63,7 @@ OUTPUTS = tuple(VECTORS)[:5]
 """In rad, rad, rad, rad/s and kg; the angles are called as the values of
 `nutdamp.spacecraft.requirements.Part`.
 """
+ANGLES = 3  # of the outputs, in front
 
 ROWS = 11  # rows of `vectors`
 

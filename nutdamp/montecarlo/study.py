@@ -36,6 +36,7 @@ from nutdamp.montecarlo.inputs import (
 )
 from nutdamp.montecarlo.propagated import Ends, RealWidths
 from nutdamp.montecarlo.statistics import (
+    ANGLES,
     CERTAIN,
     EXACT_CASES,
     OUTPUTS,
@@ -255,7 +256,7 @@ class Study(DrawnCases):
         spin required.
         """
         spacecraft = self.model.spacecraft
-        rows = [measure(self.model, ends, count)]
+        rows = [self._judged(ends, count)]
         if ends.aspects is not None:
             rows.append(
                 np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count)
@@ -263,6 +264,16 @@ class Study(DrawnCases):
         if spacecraft.goal.spin is not None:
             rows.append(np.broadcast_to(abs(ends.spin - spacecraft.goal.spin), (1, count)))
         return np.concatenate(rows)
+
+    def _judged(self, ends: Ends, count: int) -> Array:
+        """`OUTPUTS` of cases, of angles the larger ones of those as the last pulse ends and after
+        the last disturbance.
+        """
+        outputs = measure(self.model, ends, count)
+        if ends.disturbed is not None:
+            after = measure(self.model, ends.disturbed, count)[:ANGLES]
+            outputs[:ANGLES] = np.maximum(outputs[:ANGLES], after)
+        return outputs
 
     def left(self, values: Array) -> Left:
         """Residual of cases by their `values`, whose spin is as far off the goal, above it."""
@@ -277,7 +288,7 @@ class Study(DrawnCases):
 
     def outputs_of(self, draws: Draws) -> Array:
         """Outputs (5,) of one case with these deviations; none: of the estimate itself."""
-        return measure(self.model, self.ends_of(draws), 1)[:, 0]
+        return self._judged(self.ends_of(draws), 1)[:, 0]
 
     @property
     def nominal(self) -> Flight:
@@ -305,7 +316,7 @@ class Study(DrawnCases):
         """
         if shed(self.model.spacecraft) is None:
             return ""
-        outputs = self.outputs_of({})
+        outputs = measure(self.model, self.ends_of({}), 1)[:, 0]
         exact = self.nominal.residual
         part = requirements.aim(self.model.spacecraft)
         aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error

@@ -26,6 +26,7 @@ import nutdamp
 from nutdamp.files.schedules import read_plan
 from nutdamp.flight import propagation
 from nutdamp.flight.cones import aspects
+from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.verification import command, reference_model
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
@@ -256,7 +257,8 @@ def test_cases_of_a_tensor_fly_as_its_equations_in_the_axes_of_the_file() -> Non
         path = model.fly(model.initial, 0.0, schedule.end)
         ends = np.column_stack([model.initial, path(schedule.end)])
         begun, ended = model.vectors(ends, np.array([0.0, schedule.end]))[2]
-        nutation, shift, error, spin, _ = dispersed_.outputs_of(draws)
+        after_pulses = dispersed_.ends_of(draws)
+        nutation, shift, error, spin, _ = measure(dispersed_.model, after_pulses, 1)[:, 0]
         assert nutation == pytest.approx(model.nutation(ends[:, 1], schedule.end), abs=1e-10)
         assert shift == pytest.approx(attitude.angle_between(begun, ended), abs=1e-10)
         assert error == pytest.approx(attitude.angle_between(craft.momentum, ended), abs=1e-10)
@@ -564,6 +566,30 @@ def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
         ):  # a Sun besides
             within = 2e-8  # near the direction of the axis itself
             assert ends == pytest.approx((one.least, one.largest), abs=within)
+
+
+@pytest.mark.parametrize(
+    ("name", "later"), [("disturbances with an end", False), ("burn after the pulses", True)]
+)
+def test_cases_are_judged_after_the_last_disturbance_too(name: str, later: bool) -> None:
+    model = MODELS[name]
+    study = Study(model)
+    draws = dispersed.first_cases(study, 16)
+    angles = study.values(RealWidths(model)(model.cases(draws)), 16)[:2]
+    last = max(model.spacecraft.edges)
+    raised = False
+    for case in range(0, 16, 5):
+        true, made = realised(model, dispersed.one_of(draws, case))
+        ends = propagation.flown(true, made).residual
+        alone = propagation.flown(true, made, last + 1.0)
+        after = seen_at(alone, max(last, alone.schedule.end)).residual
+        raised |= after.nutation > ends.nutation
+        expected = [
+            max(ends.nutation, after.nutation),
+            max(ends.momentum_shift, after.momentum_shift),
+        ]
+        assert angles[:, case] == pytest.approx(expected, abs=2e-8)
+    assert raised is later
 
 
 def test_the_reference_integrator_sees_the_same_angles() -> None:
