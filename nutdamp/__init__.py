@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft as Spacecraft
     from nutdamp.views.check import CheckedFile as CheckedFile
 
-__version__ = "0.4.0.dev0"
+__version__ = "0.4.0"
 
 _HOMES: dict[str, tuple[str, ...]] = {
     "nutdamp.api": (

@@ -293,8 +293,10 @@ def reading(value: float, kind: str, meant: str) -> str:
     number = f"{value:.12g}"
     si = KINDS[kind].si
     unit = f"rad ({math.degrees(value):.4g} deg)" if kind == "angle" else si
-    cure = f"write {number} {meant} if that is meant, else {number} {si}"
-    return f"{number} is read as {number} {unit}; {cure}"
+    cure = f"write {number} {meant} if that is meant"
+    if meant == "m/s":  # speed of the exhaust, which is no unit of a specific impulse
+        cure = f"write {value / STANDARD_GRAVITY:.4g} {si} if m/s is meant"
+    return f"{number} is read as {number} {unit}; {cure}, else {number} {si}"
 
 
 def bar(pressure: float) -> str:

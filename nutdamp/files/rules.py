@@ -591,8 +591,6 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
 FAR = 50.0  # m; few spacecraft reach further from their centre of mass, and drawings count in mm
 FAST_AND_WHOLE = 12.0  # rad/s; above (115 rpm) a whole number is more likely one of rpm
 LOOSE = 0.1  # rad; few requirements are looser than this 5.7 deg, and many a file counts in deg
-SLUGGISH = 1.0  # s; few valves take so long, and many a data sheet counts in ms
-THIN = 1e3  # Pa; no tank feeds thrusters with less, and most data sheets count in bar
 TURN = 2.0 * math.pi
 
 
@@ -636,18 +634,24 @@ BANDS = (
         "ms",
         lambda value, facts: facts.spin is not None and value * abs(facts.spin) > TURN,
     ),
-    Doubtful(
+    Doubtful(  # s; few valves take so long, and many a data sheet counts in ms
         " ".join(f"valve.{key} thrusters.*.valve.{key}" for key in VALVE_TIMES)
         + " thrusters.*.impulse_bit.*.0 thrusters.*.impulse_bit.*.2",
         "time",
         "ms",
-        lambda value, _: value > SLUGGISH,
+        lambda value, _: value > 1.0,
     ),
-    Doubtful(
+    Doubtful(  # s; no chemical thruster has as much, and data sheets also give the speed in m/s
+        "thrusters.*.isp steerable.isp tank.isp.*.1",
+        "time",
+        "m/s",
+        lambda value, _: value > 500.0,
+    ),
+    Doubtful(  # Pa; no tank feeds thrusters with less, and most data sheets count in bar
         "tank.pressure tank.final_pressure tank.isp.*.0",
         "pressure",
         "bar",
-        lambda value, _: 0.0 < value < THIN,
+        lambda value, _: 0.0 < value < 1e3,
     ),
 )
 

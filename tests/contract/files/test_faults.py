@@ -234,6 +234,8 @@ def test_numbers_beyond_what_can_be_meant_are_taken_with_a_warning() -> None:
             THRUSTER.format(0.3, 20),
             THRUSTER.format(0.3, 0) + "valve: {open_delay: 8, close_delay: 12 ms}",
             THRUSTER.format("0.3", "0, impulse_bit: [[0.02, 0.15, 16], [0.04, 0.36, 30 s]]"),
+            THRUSTER.format(0.3, "0, isp: 2200"),
+            "steerable: {torque: 3, isp: 2200, lever_arm: 1}",
             THRUSTER.format(0.3, "0, isp: 200")
             + "tank: {propellant: 3, pressure: 22, final_pressure: 8 Pa}",
             "steerable: {torque: 3, lever_arm: 800}",
@@ -266,6 +268,8 @@ def test_units_and_common_numbers_give_no_warning_nor_does_any_file_that_comes_a
             "requirement: {nutation: 0.01, momentum_shift: 0.09}",
             "requirement: {nutation: 28 deg, momentum_shift: 0.2 rad}",
             THRUSTER.format(0.3, "2.05"),
+            THRUSTER.format(0.3, "0, isp: 2200 s"),
+            THRUSTER.format(0.3, "0, isp: 460"),
             "omega0: [0.1, 0.2, 0.3]\n" + THRUSTER.format(0.3, 20),  # a turn takes 20.9 s
             example_text(),
         ),
