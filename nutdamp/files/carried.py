@@ -185,9 +185,10 @@ def _disturbance_edits(tree: Node, spacecraft: Spacecraft, time: float) -> Edits
     for place, (index, new) in enumerate(zip(going, shifted, strict=True)):
         edits = list[tuple[KeyPath, float, str]]()
         if new.rate != 0.0:
-            across = np.array([new.transverse.real, new.transverse.imag, 0.0])
-            torque = spacecraft.inertia.in_file(across).tolist()
-            edits += [(("torque", axis), torque[axis], "torque") for axis in range(2)]
+            torque = np.array([new.transverse.real, new.transverse.imag, new.axial])
+            parts = spacecraft.inertia.in_file(torque).tolist()
+            count = 2 if spacecraft.inertia.aligned else 3
+            edits += [(("torque", axis), parts[axis], "torque") for axis in range(count)]
         edits += [(("from",), new.begin, "time"), (("until",), new.end, "time")]
         for path, value, kind in edits:
             node = tree.get("disturbances", index, *path)

@@ -31,6 +31,7 @@ TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there
 
 
 TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
+DRIFT = 0.1  # turn of a torque from where it is in space, rad, from which a tenth of it is wrong
 
 # Angle between torques, rad, up to which channels push alike: pulses of four-pulse, T_ω/8 long,
 # then overlap by half or more. Pairs mounted for two pulses are farther apart: 45° at C = 4A/3.
@@ -202,6 +203,12 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
             nutation_deg=math.degrees(disturbed.nutation),
             off_deg=math.degrees(disturbed.aim),
         )
+    still = [each for each in spacecraft.disturbances if each.rate == -spacecraft.spin]
+    if still and plan.flown is not None:
+        lasts = min(max(each.end for each in still), spacecraft.watched_until(plan.end))
+        drift = abs(plan.flight.settled.spin - spacecraft.spin) * lasts
+        if drift > DRIFT:
+            yield note("inertial-torque-drifts", drift_deg=math.degrees(drift), until_s=lasts)
     now = spacecraft.nutation
     limit = _limit_of(spacecraft, Part.NUTATION)
     if requirements.only_nutation(spacecraft):

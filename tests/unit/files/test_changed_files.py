@@ -288,6 +288,9 @@ TEXTS = {
     + ATTITUDE,
     "tank": SOUNDER + ATTITUDE + TANK,
     "turning torque": SOUNDER + ATTITUDE + LEAK,
+    "turning torque, tensor": SOUNDER.replace("{A: 120 kg m^2, C: 80 kg m^2}", TENSOR)
+    + ATTITUDE
+    + LEAK.replace("2 mN m, 0]", "2 mN m, 90 mN m]"),
     "torques that end": SOUNDER + ATTITUDE + BURNS,
     "torques that end, indented": SOUNDER + ATTITUDE + BURNS.replace("- {", "  - {"),
 }
