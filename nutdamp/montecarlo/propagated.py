@@ -708,10 +708,11 @@ def _fly_alike(
         now = edges[edge]
         number, ends = divmod(edge, 2)
         bodies = bodies.lighter(None if half is None else half[number])
-        if np.any(pulses.on_times[number]):
+        ideal = pulses.on_times[number] == 0.0
+        if not ideal.all():
             (on.remove if ends else on.add)(number)
-        elif not ends:
-            rates += pulses.impulses[number] / bodies.moments
+        if not ends and ideal.any():
+            rates += np.where(ideal, pulses.impulses[number] / bodies.moments, 0.0)
 
 
 def _fly_each(

@@ -325,6 +325,20 @@ def test_pulses_are_flown_as_by_the_reference(
     assert_flown_alike(cases(**options), numbers, tolerance)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.4])
+def test_a_pulse_may_be_an_impulse_in_some_cases_only(start: float) -> None:
+    """Widths of each case, of which one is 0: flown together as each alone."""
+    case = cases(3, starts=(start,), on_times=(0.5,), jitter=0.0)
+    widths = np.array([[0.5, 0.0, 0.3]])
+    together = fly(*case[:3], replace(case.pulses, on_times=widths))
+    for number in range(3):
+        one = slice(number, number + 1)
+        pulses = replace(case.pulses.some(one), on_times=widths[:, one])
+        alone = fly(case.bodies.some(one), case.rates[:, one], case.quaternion[:, one], pulses)
+        for of_all, single in zip(together, alone, strict=True):
+            assert_allclose(of_all[:, one], single, atol=1e-13)
+
+
 def test_pulses_that_change_their_order_in_some_cases() -> None:
     case = cases(30, starts=(0.5, 1.05, 1.1), on_times=(0.5, 0.2, 0.4), jitter=0.12)
     assert len({tuple(column) for column in np.argsort(case.pulses.edges, axis=0).T}) > 3
