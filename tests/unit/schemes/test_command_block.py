@@ -29,7 +29,7 @@ from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.end_state import left_by
 from nutdamp.physics import attitude, motion, precession
 from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies
+from nutdamp.physics.series import Bodies, Forcing
 from nutdamp.physics.sky import SunPulseClock
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
@@ -679,6 +679,39 @@ def test_sun_pulses_seen_one_by_one_are_those_seen_at_once_for_the_work_of_one_f
         (apart,) = each.sun_pulse(number).since
     assert apart == pytest.approx(together, abs=1e-9)
     assert sum(integrated) < 1.1 * apart
+
+
+def test_a_sun_whose_azimuth_turns_back_is_found_or_lost_within_few_turns(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At large nutation Newton's steps go to and fro over a turn; they took five
+    times as long."""
+    count, turned = 64, list[float]()
+    nutation, phase = np.radians(70.0), np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+    moments = np.array([70.0, 70.0, 90.0])[:, None]
+    across = np.tan(nutation) * 90.0 / 70.0
+    rates = np.array([across * np.cos(phase), across * np.sin(phase), np.ones(count)])
+    quaternion = np.zeros((4, count))
+    quaternion[0] = 1.0
+    bodies = Bodies(np.repeat(moments, count, axis=1), np.zeros(3), Forcing(growth=0.01))
+    start = MotionStretch(bodies, np.zeros(count), rates, quaternion)
+    clock = SunPulseClock(start, np.repeat(np.eye(3)[:, :1], count, axis=1), 1.0, 0.4)
+    advance = motion.advance
+
+    def moved(stretch: motion.MotionStretch, duration: Any) -> None:
+        turned.append(float(np.max(np.abs(duration))))
+        advance(stretch, duration)
+
+    monkeypatch.setattr(motion, "advance", moved)
+    for number in range(1, 6):
+        before = clock.lost
+        pulse = clock.sun_pulse(number)
+        body = attitude.rotate(attitude.conjugate(pulse.quaternion.T), np.array([1.0, 0.0, 0.0]))
+        off = np.angle(np.exp(1j * (np.arctan2(body[:, 1], body[:, 0]) - 0.4)))
+        assert np.abs(off[~clock.lost]).max(initial=0.0) < 1e-8
+        assert np.all(clock.lost >= before)
+    assert 0 < np.count_nonzero(clock.lost) < count
+    assert sum(turned) < 2.5 * float(pulse.since.max())
 
 
 @pytest.mark.parametrize("heading", [0.4, math.pi / 2, math.pi / 2 + 1e-7, 3.0, -2.0, 0.0])
