@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -9,17 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nutdamp.common.numerics import RPM
 from nutdamp.figures import geometry, sphere, style
 from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.parts import by_the_sun, direction_columns
 from nutdamp.views.text import steering
-from nutdamp.views.verdict import stated
+from nutdamp.views.verdict import exact_percent, limit, share_text, spent, stated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,14 +56,22 @@ the panel.
 
 
 @style.styled()
-def flight_figure(name: str, flight: Flight, track: Track, judged: Verdict | None = None) -> Figure:
+def flight_figure(
+    name: str,
+    flight: Flight,
+    track: Track,
+    judged: Verdict | None = None,
+    box: Callable[[Axes], None] | None = None,
+) -> Figure:
     """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for
     others.
 
-    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn.
+    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``box`` draws
+    the first panel of the overview of a plan, in place of the pole curve.
     Raises MissingExtra without matplotlib.
     """
-    return _finished(DRAWN[name], flight, track, judged)
+    draw = DRAWN[name]
+    return _finished(partial(draw, box=box) if draw is overview else draw, flight, track, judged)
 
 
 @style.styled()
@@ -117,7 +127,7 @@ def title(flight: Flight) -> str:
     )
 
 
-def overview(flight: Flight, track: Track) -> Figure:
+def overview(flight: Flight, track: Track, *, box: Callable[[Axes], None] | None = None) -> Figure:
     """Motion, and the globe where it has something to show, above history."""
     sizes = [*_courses(flight, track).values()]
     ratios = [1.0, ROOM if geometry.momentum_inset(flight, track) is not None else 1.0]
@@ -131,7 +141,11 @@ def overview(flight: Flight, track: Track) -> Figure:
     figure = style.sheet(width, tall + 1.6 + sum(sizes))
     shape: dict[str, Any] = {"height_ratios": [tall, *sizes], "width_ratios": ratios}
     grid = figure.add_gridspec(1 + len(sizes), len(ratios), **shape)
-    _pole_curve(figure.add_subplot(grid[0, 0]), flight, track)
+    first = figure.add_subplot(grid[0, 0])
+    if box is None:
+        _pole_curve(first, flight, track)
+    else:
+        box(first)
     _axis_track(figure.add_subplot(grid[0, 1]), flight, track)
     if globe:
         sphere.draw_globe(figure.add_subplot(grid[0, 2]), flight, track)
@@ -149,6 +163,157 @@ def motion(flight: Flight, track: Track) -> Figure:
     _pole_curve(pole, flight, track)
     _axis_track(sky, flight, track)
     return figure
+
+
+REACH, SPARE = 3.0, 1.25
+"""Largest and least end of an axis of the acceptance box over its limit: farther schemes are arrows
+at the edge, and a limit alone leaves room beside its label.
+"""
+
+SPOTS = 30.0  # places along an axis of the acceptance box whose points have one label
+
+OTHERS = (TURNED, INK, FIRED, GREY)  # colours of the schemes that are not recommended, in turn
+
+
+@style.styled()
+def acceptance_figure(
+    judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
+) -> Figure:
+    """The box of `acceptance`, for the report and ``plan --figure acceptance``."""
+    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
+    acceptance(figure.subplots(), judged, others)
+    style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
+    style.settle(figure)
+    return figure
+
+
+def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> None:
+    """Nutation left against the value with the tightest other limit, both limits as a box.
+
+    Each scheme is the contour that holds the share of its cases that must comply, or a point
+    without cases; the recommended one, ``judged``, is filled.
+    """
+    bounds = box_bounds(judged)
+    limits = np.array([_in_units(bound, bound.limit) for bound in bounds])
+    regions = [(judged, MOTION, acceptance_contour(judged, bounds))]
+    regions += [
+        (verdict, colour, acceptance_contour(verdict, bounds))
+        for verdict, colour in zip(others, itertools.cycle(OTHERS), strict=False)
+    ]
+    tops = np.array([region.max(axis=0) for _, _, region in regions])
+    within = [np.all(region.min(axis=0) <= REACH * limits) for _, _, region in regions]
+    farthest = np.max(tops[within], axis=0, initial=0.0)
+    bounded = np.isfinite(limits)
+    near = np.clip(1.1 * farthest, SPARE * limits, REACH * limits)
+    ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), geometry.LEAST)
+    corner = np.where(bounded, limits, 2.0 * ends)
+    look: dict[str, Any] = {**style.LIMIT, "label": None}
+    axes.fill_between([0.0, corner[0]], corner[1], color=GREY, alpha=0.12, linewidth=0.0)
+    axes.plot([corner[0], corner[0], 0.0], [0.0, corner[1], corner[1]], **look)
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for verdict, colour, region in reversed(regions):
+        recommended = verdict is judged
+        solid = "-" if verdict.met is not False else (0, (4, 1.5))
+        name = _contender(verdict)
+        beyond = region.min(axis=0) > ends
+        if beyond.any():
+            row = int(beyond[1])
+            nominal = _nominal(verdict, bounds)
+            place = np.minimum(nominal, ends)
+            mark = "^" if beyond[1] else ">"
+            name += f": {_in_words(bounds[row], nominal[row])}"
+        else:
+            place = region[-1]
+            mark = "o"
+        if beyond.any() or len(region) < 3:
+            ground = colour if recommended else "none"
+            look = {"color": colour, "markersize": 7, "markerfacecolor": ground, "clip_on": False}
+            axes.plot(*place, mark, zorder=3, **look)
+            spot = tuple((np.round(place / ends * SPOTS) / SPOTS * ends).tolist())
+            labels.setdefault(spot, []).append(name)
+        else:
+            if recommended:
+                axes.fill(*region.T, color=colour, alpha=0.3, linewidth=0.0)
+            outline = np.vstack([region, region[:1]])
+            axes.plot(*outline.T, color=colour, linestyle=solid, linewidth=1.5)
+            far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
+            style.add(axes, name, np.minimum(far, 0.97 * ends), colour, role="vital")
+    for spot, names in labels.items():
+        style.add(axes, "\n".join(reversed(names)), np.array(spot), INK, role="vital")
+    across, along = map(_bound_axis, bounds)
+    axes.set(xlim=(0.0, ends[0]), ylim=(0.0, ends[1]), xlabel=across, ylabel=along)
+    axes.locator_params(nbins=6)
+    axes.grid()
+    marks = "points: nominal values"
+    if judged.results is not None and judged.cases is not None:
+        marks = f"contours: {exact_percent(judged.cases.probability)} of the cases"
+    axes.set_title(f"Acceptance box: what a scheme leaves\n{marks}; filled: recommended")
+
+
+def box_bounds(judged: Verdict) -> tuple[Bound, Bound]:
+    """The bounds of the acceptance box: nutation left, and the tightest other one at the end.
+
+    Without another one the end of H, which has no limit then.
+    """
+    ends = [line for line in judged.lines if line.bound.keep is None]
+    nutation = next(line.bound for line in ends if line.bound.part is Part.NUTATION)
+    tight = min(
+        (line for line in ends if line.bound is not nutation),
+        key=lambda line: (not line.bound.required, line.room),
+        default=None,
+    )
+    free = Bound(requirements.aim(judged.spacecraft), math.inf, False)
+    return nutation, free if tight is None else tight.bound
+
+
+def acceptance_contour(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
+    """(n, 2) in the units of `acceptance`: the hull of the cases that use least of both bounds, as
+    many as must comply; one point, of nominal values, without cases.
+
+    It lies within the box where enough cases keep both bounds, and nowhere else.
+    """
+    scale = np.array([_in_units(bound, 1.0) for bound in bounds])
+    if verdict.results is not None and verdict.cases is not None:
+        spreads = [verdict.results.spread(bound) for bound in bounds]
+        if all(hasattr(spread, "values") for spread in spreads):  # not only counted
+            values = np.column_stack([spread.values for spread in spreads])
+            used = np.maximum(*(bound.used(values[:, row]) for row, bound in enumerate(bounds)))
+            count = math.ceil(verdict.cases.probability * len(used))
+            return geometry.hull(scale * values[np.argsort(used, kind="stable")[:count]])
+    return _nominal(verdict, bounds)[None]
+
+
+def _nominal(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
+    """(2,): nominal values in the units of `acceptance`."""
+    assert verdict.flight is not None
+    nominal = {line.bound: line.nominal for line in verdict.lines}
+    values = (nominal.get(bound, verdict.flight.residual.axis_error) for bound in bounds)
+    return np.array([_in_units(*pair) for pair in zip(bounds, values, strict=True)])
+
+
+def _contender(verdict: Verdict) -> str:
+    """Scheme, cost and share of the cases that comply."""
+    share = "" if verdict.cases is None else f", {share_text(verdict.cases)}"
+    return f"{verdict.scheme} {spent(verdict.schedule)}{share}"
+
+
+def _in_units(bound: Bound, value: float) -> float:
+    """A value of a bound's part in deg, of the spin in rpm."""
+    return RPM * value if bound.part is Part.SPIN else math.degrees(value)
+
+
+def _in_words(bound: Bound, value: float) -> str:
+    return f"{style.number(value)}{' rpm' if bound.part is Part.SPIN else '°'}"
+
+
+def _bound_axis(bound: Bound) -> str:
+    """Name of an axis of the acceptance box with its limit."""
+    name = "nutation left" if bound.part is Part.NUTATION else bound.label
+    unit = "rpm" if bound.part is Part.SPIN else "°"
+    if math.isinf(bound.limit):
+        return f"{name}, {unit} (no limit)"
+    word = "required" if bound.required else "damped"
+    return f"{name}, {unit} ({word} {limit(bound).replace(' deg', '°')})"
 
 
 def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:

@@ -33,7 +33,7 @@ from nutdamp.common.results import note
 from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults, loop_study
 from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.figures import studies
+from nutdamp.figures import overview, studies
 from nutdamp.figures.overview import BAR
 from nutdamp.figures.signals import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
@@ -46,11 +46,12 @@ from nutdamp.planning.verdict import Status
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part, aim
 from nutdamp.spacecraft.schedule import Bounds, Schedule
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.text import cost, sentences, text
 from nutdamp.views.trade import FAILS, fails, front_parts, trade_notes
-from nutdamp.views.verdict import lead, statement
+from nutdamp.views.verdict import lead, share_text, spent, statement
 
 REQUIRED = Requirement(math.radians(0.5), math.radians(0.2), 0.997)
 TOLERANCES = Dispersions(
@@ -362,6 +363,56 @@ def test_studies_are_drawn_whole_seen_on_any_page_and_say_what_is_met(
     verdict = study(which).verdict
     assert verdict.status is Status.NOT_ENOUGH
     assert heading(drawn(name, which)).endswith(f" {lead(verdict)}: {statement(verdict)}")
+
+
+@pytest.mark.parametrize("which", ["shift", weekly("target")])
+@pytest.mark.parametrize("factor", [0.3, 0.6, 0.9, 1.0, 1.4, 2.0, 3.0])
+def test_a_contour_lies_in_the_box_where_enough_cases_keep_both_limits(
+    which: str, factor: float
+) -> None:
+    """Whatever the limits are, and nowhere else; it holds the share required."""
+    verdict, results = study(which).verdict, study(which).core
+    bounds = overview.box_bounds(verdict)
+    assert {bound.part for bound in bounds} == {Part.NUTATION, aim(verdict.spacecraft)}
+    nutation, other = (bound._replace(limit=factor * bound.limit) for bound in bounds)
+    region = overview.acceptance_contour(verdict, (nutation, other))
+    rows = present(results.values)[[OUTPUTS.index(bound.part.value) for bound in bounds]]
+    keep = nutation.met(rows[0]) & other.met(rows[1])
+    limits = np.degrees([nutation.limit, other.limit])
+    assert bool(np.all(region <= limits * (1.0 + 1e-12))) == (keep.mean() >= results.probability)
+    corners = np.degrees(rows.T)
+    inside = np.ones(len(corners), dtype=bool)
+    for corner, following in zip(region, np.roll(region, -1, axis=0), strict=True):
+        (x, y), (across, along) = following - corner, (corners - corner).T
+        inside &= x * along - y * across >= -1e-12
+    assert inside.mean() >= results.probability
+
+
+@pytest.mark.deep
+def test_the_acceptance_box_names_every_scheme_with_cost_and_share() -> None:
+    compared = compare(BODY, samples=2_048)
+    figure = compared.figure("acceptance")
+    check_layout(figure)
+    check_colours(figure)
+    (axes,) = figure.axes
+    words = [line for note in axes.texts for line in note.get_text().split("\n")]
+    for plan, verdict in compared.verdicts.items():
+        (label,) = [text for text in words if text.startswith(f"{plan.scheme} ")]
+        assert label.startswith(f"{plan.scheme} {spent(plan.pulses)}, {share_text(verdict.cases)}")
+    (off,) = [text for text in words if text.startswith("one-pulse")]
+    shift = math.degrees(compared["one-pulse"].flight.residual.momentum_shift)
+    assert off.endswith(f": {shift:.3g}°")
+    assert len(axes.patches) == 1, "the recommended one is filled"
+
+
+def test_without_cases_schemes_are_points_and_a_missing_limit_is_no_edge() -> None:
+    free = replace(BODY, dispersions=None, requirement=Requirement(math.radians(0.5)))
+    compared = compare(free, ["one-pulse", "two-pulse"])
+    (axes,) = compared.figure("acceptance").axes
+    assert axes.get_ylabel() == "momentum shift, ° (no limit)"
+    dots = [np.asarray(one.get_xydata())[0] for one in axes.lines if one.get_marker() == "o"]
+    shifts = [math.degrees(plan.flight.residual.momentum_shift) for plan in compared]
+    assert sorted(dot[1] for dot in dots) == pytest.approx(sorted(shifts), abs=1e-9)
 
 
 @pytest.mark.deep
