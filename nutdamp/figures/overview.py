@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.common.numerics import RPM
 from nutdamp.figures import geometry, sphere, style
-from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN, TURNED
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
-from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.parts import by_the_sun, direction_columns
 from nutdamp.views.text import steering
-from nutdamp.views.verdict import exact_percent, limit, share_text, spent, stated
+from nutdamp.views.verdict import stated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,6 +54,9 @@ the panel.
 """
 
 
+NO_OUTLINES: Mapping[str, Vector] = MappingProxyType({})  # of an axis track without a verdict
+
+
 @style.styled()
 def flight_figure(
     name: str,
@@ -75,11 +77,19 @@ def flight_figure(
 
 
 @style.styled()
-def history_figure(
-    flight: Flight, track: Track, judged: Verdict | None = None, *, narrow: bool = False
+def course_figure(
+    flight: Flight,
+    track: Track,
+    judged: Verdict | None = None,
+    outlines: Mapping[str, Vector] = NO_OUTLINES,
+    *,
+    narrow: bool = False,
 ) -> Figure:
-    """Nutation, firings and rates over time, as on the report; ``narrow``: for a phone."""
-    return _finished(partial(history, narrow=narrow), flight, track, judged)
+    """Axis track with the ``outlines`` of `studies.accepted` above nutation and firings, as on the
+    first screen of the report; ``narrow``: for a phone.
+    """
+    draw = partial(course, outlines=outlines, narrow=narrow)
+    return _finished(draw, flight, track, judged)
 
 
 def _finished(
@@ -129,7 +139,8 @@ def title(flight: Flight) -> str:
 
 def overview(flight: Flight, track: Track, *, box: Callable[[Axes], None] | None = None) -> Figure:
     """Motion, and the globe where it has something to show, above history."""
-    sizes = [*_courses(flight, track).values()]
+    courses = _courses(flight, track)
+    sizes = [*courses.values()]
     ratios = [1.0, ROOM if geometry.momentum_inset(flight, track) is not None else 1.0]
     width = 9.6
     tall = TALL
@@ -149,7 +160,7 @@ def overview(flight: Flight, track: Track, *, box: Callable[[Axes], None] | None
     _axis_track(figure.add_subplot(grid[0, 1]), flight, track)
     if globe:
         sphere.draw_globe(figure.add_subplot(grid[0, 2]), flight, track)
-    _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track)
+    _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track, courses)
     return figure
 
 
@@ -165,157 +176,6 @@ def motion(flight: Flight, track: Track) -> Figure:
     return figure
 
 
-REACH, SPARE = 3.0, 1.25
-"""Largest and least end of an axis of the acceptance box over its limit: farther schemes are arrows
-at the edge, and a limit alone leaves room beside its label.
-"""
-
-SPOTS = 30.0  # places along an axis of the acceptance box whose points have one label
-
-OTHERS = (TURNED, INK, FIRED, GREY)  # colours of the schemes that are not recommended, in turn
-
-
-@style.styled()
-def acceptance_figure(
-    judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
-) -> Figure:
-    """The box of `acceptance`, for the report and ``plan --figure acceptance``."""
-    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
-    acceptance(figure.subplots(), judged, others)
-    style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
-    style.settle(figure)
-    return figure
-
-
-def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> None:
-    """Nutation left against the value with the tightest other limit, both limits as a box.
-
-    Each scheme is the contour that holds the share of its cases that must comply, or a point
-    without cases; the recommended one, ``judged``, is filled.
-    """
-    bounds = box_bounds(judged)
-    limits = np.array([_in_units(bound, bound.limit) for bound in bounds])
-    regions = [(judged, MOTION, acceptance_contour(judged, bounds))]
-    regions += [
-        (verdict, colour, acceptance_contour(verdict, bounds))
-        for verdict, colour in zip(others, itertools.cycle(OTHERS), strict=False)
-    ]
-    tops = np.array([region.max(axis=0) for _, _, region in regions])
-    within = [np.all(region.min(axis=0) <= REACH * limits) for _, _, region in regions]
-    farthest = np.max(tops[within], axis=0, initial=0.0)
-    bounded = np.isfinite(limits)
-    near = np.clip(1.1 * farthest, SPARE * limits, REACH * limits)
-    ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), geometry.LEAST)
-    corner = np.where(bounded, limits, 2.0 * ends)
-    look: dict[str, Any] = {**style.LIMIT, "label": None}
-    axes.fill_between([0.0, corner[0]], corner[1], color=GREY, alpha=0.12, linewidth=0.0)
-    axes.plot([corner[0], corner[0], 0.0], [0.0, corner[1], corner[1]], **look)
-    labels: dict[tuple[float, ...], list[str]] = {}
-    for verdict, colour, region in reversed(regions):
-        recommended = verdict is judged
-        solid = "-" if verdict.met is not False else (0, (4, 1.5))
-        name = _contender(verdict)
-        beyond = region.min(axis=0) > ends
-        if beyond.any():
-            row = int(beyond[1])
-            nominal = _nominal(verdict, bounds)
-            place = np.minimum(nominal, ends)
-            mark = "^" if beyond[1] else ">"
-            name += f": {_in_words(bounds[row], nominal[row])}"
-        else:
-            place = region[-1]
-            mark = "o"
-        if beyond.any() or len(region) < 3:
-            ground = colour if recommended else "none"
-            look = {"color": colour, "markersize": 7, "markerfacecolor": ground, "clip_on": False}
-            axes.plot(*place, mark, zorder=3, **look)
-            spot = tuple((np.round(place / ends * SPOTS) / SPOTS * ends).tolist())
-            labels.setdefault(spot, []).append(name)
-        else:
-            if recommended:
-                axes.fill(*region.T, color=colour, alpha=0.3, linewidth=0.0)
-            outline = np.vstack([region, region[:1]])
-            axes.plot(*outline.T, color=colour, linestyle=solid, linewidth=1.5)
-            far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
-            style.add(axes, name, np.minimum(far, 0.97 * ends), colour, role="vital")
-    for spot, names in labels.items():
-        style.add(axes, "\n".join(reversed(names)), np.array(spot), INK, role="vital")
-    across, along = map(_bound_axis, bounds)
-    axes.set(xlim=(0.0, ends[0]), ylim=(0.0, ends[1]), xlabel=across, ylabel=along)
-    axes.locator_params(nbins=6)
-    axes.grid()
-    marks = "points: nominal values"
-    if judged.results is not None and judged.cases is not None:
-        marks = f"contours: {exact_percent(judged.cases.probability)} of the cases"
-    axes.set_title(f"Acceptance box: what a scheme leaves\n{marks}; filled: recommended")
-
-
-def box_bounds(judged: Verdict) -> tuple[Bound, Bound]:
-    """The bounds of the acceptance box: nutation left, and the tightest other one at the end.
-
-    Without another one the end of H, which has no limit then.
-    """
-    ends = [line for line in judged.lines if line.bound.keep is None]
-    nutation = next(line.bound for line in ends if line.bound.part is Part.NUTATION)
-    tight = min(
-        (line for line in ends if line.bound is not nutation),
-        key=lambda line: (not line.bound.required, line.room),
-        default=None,
-    )
-    free = Bound(requirements.aim(judged.spacecraft), math.inf, False)
-    return nutation, free if tight is None else tight.bound
-
-
-def acceptance_contour(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
-    """(n, 2) in the units of `acceptance`: the hull of the cases that use least of both bounds, as
-    many as must comply; one point, of nominal values, without cases.
-
-    It lies within the box where enough cases keep both bounds, and nowhere else.
-    """
-    scale = np.array([_in_units(bound, 1.0) for bound in bounds])
-    if verdict.results is not None and verdict.cases is not None:
-        spreads = [verdict.results.spread(bound) for bound in bounds]
-        if all(hasattr(spread, "values") for spread in spreads):  # not only counted
-            values = np.column_stack([spread.values for spread in spreads])
-            used = np.maximum(*(bound.used(values[:, row]) for row, bound in enumerate(bounds)))
-            count = math.ceil(verdict.cases.probability * len(used))
-            return geometry.hull(scale * values[np.argsort(used, kind="stable")[:count]])
-    return _nominal(verdict, bounds)[None]
-
-
-def _nominal(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
-    """(2,): nominal values in the units of `acceptance`."""
-    assert verdict.flight is not None
-    nominal = {line.bound: line.nominal for line in verdict.lines}
-    values = (nominal.get(bound, verdict.flight.residual.axis_error) for bound in bounds)
-    return np.array([_in_units(*pair) for pair in zip(bounds, values, strict=True)])
-
-
-def _contender(verdict: Verdict) -> str:
-    """Scheme, cost and share of the cases that comply."""
-    share = "" if verdict.cases is None else f", {share_text(verdict.cases)}"
-    return f"{verdict.scheme} {spent(verdict.schedule)}{share}"
-
-
-def _in_units(bound: Bound, value: float) -> float:
-    """A value of a bound's part in deg, of the spin in rpm."""
-    return RPM * value if bound.part is Part.SPIN else math.degrees(value)
-
-
-def _in_words(bound: Bound, value: float) -> str:
-    return f"{style.number(value)}{' rpm' if bound.part is Part.SPIN else '°'}"
-
-
-def _bound_axis(bound: Bound) -> str:
-    """Name of an axis of the acceptance box with its limit."""
-    name = "nutation left" if bound.part is Part.NUTATION else bound.label
-    unit = "rpm" if bound.part is Part.SPIN else "°"
-    if math.isinf(bound.limit):
-        return f"{name}, {unit} (no limit)"
-    word = "required" if bound.required else "damped"
-    return f"{name}, {unit} ({word} {limit(bound).replace(' deg', '°')})"
-
-
 def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and
     channels marked.
@@ -328,9 +188,11 @@ def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     axes.set(xlabel=f"ω1, °/s{geometry.pole_note(flight)}", ylabel="ω2, °/s", title=title)
 
 
-def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
+def _axis_track(
+    axes: Axes, flight: Flight, track: Track, outlines: Mapping[str, Vector] = NO_OUTLINES
+) -> None:
     """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus
-    1970 fig. 6-8).
+    1970 fig. 6-8), with ``outlines`` of where H may end.
     """
     path, momentum = geometry.sky_paths(flight, track)
     target = geometry.sky_target(flight, track)
@@ -338,6 +200,8 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     _path(axes, flight, track, path)
     places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     style.target(axes, target)
+    for name, outline in outlines.items():
+        axes.plot(*outline.T, **ACCEPTED[name])
     middle, half = style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
     if small is None:
         style.add(axes, "H", places[0], TURNED, role="vital")
@@ -361,6 +225,13 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
         axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
     x, y, sense = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
+
+
+ACCEPTED: dict[str, dict[str, Any]] = {
+    "limit": {**style.LIMIT, "label": "H may end within"},
+    "contour": {"color": MOMENTUM, "linewidth": 1.5, "label": "H ends within, cases required"},
+}
+"""Looks of the lines of `studies.accepted`."""
 
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
@@ -537,15 +408,18 @@ BAR = 0.46  # height of a bar; the distance between two rows is 1
 CHANGES = 1e-3  # share of the largest ω3 from which on its change is drawn
 
 
-def _courses(flight: Flight, track: Track) -> dict[Callable[[Axes, Flight, Track], None], float]:
-    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2, and ω3
-    where it changes.
+def _courses(
+    flight: Flight, track: Track, *, rates: bool = True
+) -> dict[Callable[[Axes, Flight, Track], None], float]:
+    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2 for
+    ``rates``, and ω3 where it changes.
     """
     spin = track.rates[:, 2]
     courses: dict[Callable[[Axes, Flight, Track], None], float] = {nutation_history: 1.9}
     for height in firings_height(flight):
         courses[lambda axes, flight, track: firings(axes, flight, float(track.t[-1]))] = height
-    courses[_rate_history] = 1.5
+    if rates:
+        courses[_rate_history] = 1.5
     if float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max()):
         courses[_spin_history] = 0.9
     return courses
@@ -559,26 +433,32 @@ def firings_height(flight: Flight) -> list[float]:
     return [0.3 + 0.36 * rows] if rows else []
 
 
-def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
-    """Nutation, firings and rates over one time axis; ``narrow``: for a phone."""
-    sizes = [*_courses(flight, track).values()]
-    figure = style.sheet(style.PHONE if narrow else 7.4, 1.6 + sum(sizes))
-    grid = figure.add_gridspec(len(sizes), 1, height_ratios=sizes)
-    _draw_courses(figure, [grid[row] for row in range(len(sizes))], flight, track)
+def course(flight: Flight, track: Track, *, outlines: Mapping[str, Vector], narrow: bool) -> Figure:
+    """Axis track above nutation, firings and changing spin; ``narrow``: for a phone."""
+    courses = _courses(flight, track, rates=False)
+    sizes = [*courses.values()]
+    figure = style.sheet(style.PHONE if narrow else 5.2, 5.0 + sum(sizes))
+    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.6, *sizes])
+    _axis_track(figure.add_subplot(grid[0]), flight, track, outlines)
+    _draw_courses(figure, [grid[row + 1] for row in range(len(sizes))], flight, track, courses)
     return figure
 
 
 def _draw_courses(
-    figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track
+    figure: Figure,
+    cells: Sequence[SubplotSpec],
+    flight: Flight,
+    track: Track,
+    courses: Iterable[Callable[[Axes, Flight, Track], None]],
 ) -> None:
-    """The panels over time in ``cells`` of a figure, from above, with their legend."""
+    """The panels over time in ``cells`` of a figure, from above, with the legend of all panels."""
     panels: list[Axes] = []
-    for cell, draw in zip(cells, _courses(flight, track), strict=True):
+    for cell, draw in zip(cells, courses, strict=True):
         panels.append(figure.add_subplot(cell, sharex=panels[0] if panels else None))
         draw(panels[-1], flight, track)
         panels[-1].tick_params(labelbottom=len(panels) == len(cells))
     panels[-1].set_xlabel(TIME)
-    style.legend(figure, panels)
+    style.legend(figure, figure.axes)
 
 
 def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
@@ -596,6 +476,11 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
     _bands(axes, flight, track)
     style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
+    ended = float(angles[-1])
+    mark = "o" if ended > low else "v"  # below the scale
+    axes.plot(
+        track.t[-1], max(ended, low), mark, color=MOTION, markerfacecolor=PAPER, clip_on=False
+    )
     last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
     axes.set_title(last, loc="right", color=INK, **style.NOTE)
 

@@ -12,12 +12,13 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from nutdamp.figures import geometry
+from nutdamp.figures.overview import NO_OUTLINES
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
 from nutdamp.page.document import (
@@ -51,6 +52,7 @@ SPHERE = 10_000  # length of a unit vector of the globe as whole numbers: 0.006 
 ANGLE_DIGITS = 4  # decimals of degrees; more where the largest nutation has not so many figures
 # largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
 FAR = 4.0
+END = 0.03  # radius of the mark of the end of the spin axis over half the side of that panel
 NONE = -(10**8)  # entry of a row for an angle that does not exist
 QUICK, UNHURRIED, SLOW = (
     4.0,
@@ -88,9 +90,11 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
     return tuple(directions)
 
 
-def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
+def moving_of(
+    plan: Plan, craft: str = "SPACECRAFT", outlines: Mapping[str, Vector] = NO_OUTLINES
+) -> Moving:
     """The view of a plan flown through the real pulse widths; ``craft``: words of a command for the
-    spacecraft.
+    spacecraft. ``outlines``: where H may end and ends in cases, degrees on the axis track.
     """
     spacecraft = plan.spacecraft
     named = named_directions(plan.spacecraft)
@@ -101,6 +105,10 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
     samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
     panels, columns, target, rooms = _panels(flown, track, named)
+    end = geometry.sky_paths(flown, track)[0][-1] + END * rooms[1][1] * geometry.circle()
+    lines = {**outlines, "end": end}.items()
+    paths = tuple((kind, _path(placed(outline, *rooms[1]))) for kind, outline in lines)
+    panels = (panels[0], panels[1]._replace(outlines=paths))
     strip, span = strip_of(flown, track, until)
     texts = {"none": 0}
     firing = []
@@ -244,6 +252,11 @@ def _panels(
         [column[0] for column in placed(target, *rooms[1]) if column] or None,
         rooms,
     )
+
+
+def _path(columns: list[list[int]]) -> str:
+    """A closed line as data of an SVG path."""
+    return "M" + "L".join(f"{x} {y}" for x, y in zip(*columns, strict=True)) + "Z"
 
 
 def _numbered(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:

@@ -135,7 +135,7 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     """Figure by its name of a flight, of that of a plan or of the recommended one; raises
     BadRequest, Infeasible.
     """
-    from nutdamp.figures import overview
+    from nutdamp.figures import overview, studies
 
     judged = None if isinstance(result, Flight) else result.verdict
     others: tuple[Verdict, ...] = ()
@@ -149,8 +149,8 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
         assert judged is not None
         feasible(result)
         if name == "acceptance":
-            return overview.acceptance_figure(judged, others)
-        box = partial(overview.acceptance, judged=judged, others=others)
+            return studies.acceptance_figure(judged, others)
+        box = partial(studies.acceptance, judged=judged, others=others)
         flight, track = overview.shown(result)
     elif isinstance(result, Flight):
         flight = result

@@ -106,6 +106,9 @@ for (const view of document.querySelectorAll(".moving")) {
       const [xs, ys] = rows.t[1] === rows.t[0] ? [[0, ...across], [rises[0], ...rises]] : [across, rises];
       path.setAttribute("d", line(xs.map((x) => x.toFixed(1)), ys.map((y) => y.toFixed(1))));
     }
+    const end = part("end").style;
+    const level = (high - rows.theta[last] / 10 ** data.digits.cone) / (high - low);
+    [end.left, end.top] = ["100%", `calc(8.5rem * ${level.toFixed(4)})`];
   };
 
   // ---- rolling cones: seen along H, angles true to scale

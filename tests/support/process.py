@@ -181,7 +181,8 @@ def unpictured() -> Iterator[None]:
     with patch.multiple(
         report,
         moving_of=one,
-        flight_pictures=several,
+        flight_picture=one,
+        acceptance_picture=one,
         trade_picture=one,
         dispersion_pictures=several,
     ):
