@@ -140,7 +140,6 @@ def draw_distribution(
     )
     if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
         axes.set_xscale("log")
-        style.log_axis(axes.xaxis)
         axes.set_xlim(left=math.degrees(max(distribution.minimum, high * 10.0**-DECADES)))
         name += " (log)"
     else:
@@ -148,6 +147,8 @@ def draw_distribution(
     if limit is not None:
         axes.axvline(limit, **style.LIMIT)
         axes.set_xlim(right=max(axes.get_xlim()[1], 1.04 * limit))
+    if axes.get_xscale() == "log":
+        style.log_axis(axes.xaxis)
     axes.set(xlabel=name, ylabel="cases within, %", ylim=(0.0, 104.0))
     axes.grid()
 
@@ -260,7 +261,7 @@ def accepted(flight: Flight, judged: Verdict) -> dict[str, Vector]:
     ``contour`` that holds the share of the cases that must comply; without those that are unknown.
     """
     spacecraft = flight.spacecraft
-    start = flight.sampled(2, flight.shown_to).momentum[0]
+    start = spacecraft.momentum
     sky = geometry.sky_plane(flight, start)
     goal = spacecraft.goal.axis
     about = sky if goal is None else geometry.sky_plane(flight, goal)
@@ -440,7 +441,6 @@ LOOKS = (
 
 SAME_ENDS = (0.02, 0.002)  # relative differences in end and in cost of points that are drawn as one
 WIDTH = 14.0  # characters of a line above the picture in an inch of it
-FEWEST = 3  # ticks of a decade's 1, 2 and 5 below which the axis of time has others
 
 
 REACH = 1.4
@@ -466,8 +466,6 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
 
     Fronts without points are named, with reasons. ``narrow``: for phones.
     """
-    from matplotlib.ticker import LogLocator, MaxNLocator
-
     spacecraft, fronts, chosen = traded.spacecraft, traded.fronts, traded.recommended
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
@@ -509,16 +507,7 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
     least = "the lower bound" if proven else "the cheapest point"
     axes.set(xlabel="end of the last firing, s")
     axes.set_ylabel(f"{name} over {least}, {written(base, unit)}, %")
-    if log:  # ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one
-        low, high = axes.get_xlim()
-        few = (
-            sum(
-                low <= value <= high
-                for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)
-            )
-            < FEWEST
-        )
-        axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
+    if log:
         style.log_axis(axes.xaxis)
     axes.grid(True, which="both")
     style.legend(figure, [axes], 3)

@@ -248,7 +248,21 @@ def thinned(count: int, most: int = 24) -> list[int]:
 
 
 def log_axis(axis: Axis) -> None:
-    """Plain numbers at the decades of a log axis, none between them."""
+    """Plain numbers at the decades of a log axis whose limits are set; where these are fewer than
+    two, at 1, 2 and 5 of each, or evenly within part of one.
+    """
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+    low, high = sorted(axis.get_view_interval())
+    for subs in ((1.0,), (1.0, 2.0, 5.0)):
+        locator = LogLocator(subs=subs)
+        within = (low <= tick <= high for tick in locator.tick_values(low, high))
+        if sum(within) > 1:
+            axis.set_major_locator(locator)
+            break
+    else:
+        axis.set_major_locator(MaxNLocator(5))
+        axis.set_minor_locator(NullLocator())
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter("")
 

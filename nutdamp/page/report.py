@@ -394,7 +394,7 @@ def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     lines += [Prose(f"Note: {note}.")] if note else []
     required = document.sheet(verdicts.bound_table(judged))
     yield from lines
-    yield document.Beside(dispersion_pictures(dispersed))
+    yield dispersion_picture(dispersed)
     rest = [
         block
         for block in document.blocks_of(
@@ -560,9 +560,9 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     return _picture("trade", *figures)
 
 
-def dispersion_pictures(dispersed: Dispersion) -> tuple[Picture, ...]:
+def dispersion_picture(dispersed: Dispersion) -> Picture:
     """Final directions of H in the cases of a study; raises MissingExtra."""
-    return (_picture("momentum", studies.dispersion_figure(dispersed, "momentum")),)
+    return _picture("momentum", studies.dispersion_figure(dispersed, "momentum"))
 
 
 def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:

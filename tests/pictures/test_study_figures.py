@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.text import Annotation
+from support import places
 from support.builders import aimed, cross, present, spinner
 from support.cases import deep, weekly
 from support.dispersed import jet, normal
@@ -28,6 +29,7 @@ from support.shown import (
 )
 from support.spinners import commanded
 
+import nutdamp
 from nutdamp.common.numerics import down
 from nutdamp.common.results import note
 from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults, loop_study
@@ -35,9 +37,9 @@ from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.figures import studies, style
 from nutdamp.figures.overview import BAR
-from nutdamp.figures.signals import first_seconds, loop_figure
+from nutdamp.figures.signals import loop_figure, time_unit, upkeep
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
-from nutdamp.page.report import dispersion_pictures
+from nutdamp.page.report import dispersion_picture
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
 from nutdamp.planning.decision import compare
@@ -549,7 +551,7 @@ def test_nothing_that_varies_is_drawn(name: str) -> None:
 def test_captions_name_no_bound_that_is_not_drawn(required: Requirement | None) -> None:
     varied = Dispersions(A=Tolerance("normal", 0.02, relative=True))
     results = studied(replace(BODY, requirement=required, dispersions=varied), 50)
-    _, momentum = dispersion_pictures(results)
+    momentum = dispersion_picture(results)
     assert (
         "required" not in momentum.caption
     )  # the circle of a requirement may lie outside the picture
@@ -617,11 +619,21 @@ def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bo
 
 
 @pytest.mark.deep
-def test_the_first_seconds_of_a_long_run_are_enlarged() -> None:
+def test_a_loop_shows_its_dead_band_and_what_holding_takes() -> None:
+    """Pulses after the first quiet over the time from it on; time in hours where it is long."""
     plan = loop_of(looping(), 400.0)
     figure = loop_figure(plan)
     check_layout(figure)
-    whole, first = figure.axes[:2]
-    assert whole.get_xlim()[1] == pytest.approx(400.0)
-    assert first.get_xlim()[1] == pytest.approx(first_seconds(plan))
-    assert figure.axes[1].get_title() == f"The first {first_seconds(plan):#.3g} s"
+    assert "dead band" in legend_words(figure)
+    assert [axes.get_xlabel() for axes in figure.axes][-1] == "time, s"
+    assert upkeep(plan) == "", "nothing grows, so that it never fires again"
+    held = loop_of(nutdamp.load(places.CONFIGS / "ulysses.yaml"))
+    run, settled = held.flown_run, present(held.flown_run.settled)
+    later = [firing.pulse for firing in run.fired if firing.pulse.t > settled]
+    year = sum(present(pulse.propellant) for pulse in later) / (run.until - settled)
+    assert f"{len(later) / (run.until - settled) * 86400.0:#.3g} pulses a day" in upkeep(held)
+    assert f"{year * 365.25 * 86400.0:#.3g} kg a year".rstrip() in upkeep(held)
+    figure = loop_figure(held)
+    check_layout(figure)
+    assert figure.axes[-1].get_xlabel() == "time, hours"
+    assert [time_unit(until)[0] for until in (7200.0, 7201.0, 3e5)] == ["s", "hours", "days"]
