@@ -404,6 +404,9 @@ FULL, PALE = 0.9, 0.35
 they do not.
 """
 
+RATES = (("ω1", MOTION, (0, (6, 1.5, 1, 1.5))), ("ω2", INK, (0, (4, 1.5))))
+"""Rates across the axis, with colours and dashes: θ alone is a blue line without a gap."""
+
 BAR = 0.46  # height of a bar; the distance between two rows is 1
 CHANGES = 1e-3  # share of the largest ω3 from which on its change is drawn
 
@@ -488,10 +491,10 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
 def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
-    axes.plot(track.t, rates[:, 0], color=MOTION, linewidth=width, label="ω1")
-    axes.plot(
-        track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2"
-    )
+    for row, (name, colour, dashes) in enumerate(RATES):
+        axes.plot(
+            track.t, rates[:, row], color=colour, linewidth=width, linestyle=dashes, label=name
+        )
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
     axes.set_ylim(-half, half)
     _bands(axes, flight, track)

@@ -146,7 +146,8 @@ def _draw_keep(
     Yields the label of each, and its place (2,).
     """
     (place,), (height,) = looked.seen(direction)
-    axes.plot(*place, "o", color=INK, markersize=6, markerfacecolor="none", zorder=4)
+    axes.plot(*place, "o", color=INK, markersize=7, markerfacecolor="none", zorder=4)
+    axes.plot(*place, ".", color=INK, markersize=3, zorder=4)  # as astronomers mark the Sun
     yield (f"{cone.name} (behind)" if height < 0.0 else cone.name), place
     square = attitude.square_to(direction)
     bounds = [("≥", cone.least, cone.least > 0.0), ("≤", cone.most, cone.most < math.pi)]

@@ -113,6 +113,8 @@ def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) 
             else None
         )
         draw_distribution(axes, distribution, f"{name}, °", shown)
+        if limit is not None and shown is None:
+            style.off_scale(axes, f"required ≤ {style.number(limit)}°")
         axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
         axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
         missed = part in lines and not lines[part].met
@@ -234,6 +236,8 @@ def _momentum(axes: Axes, results: Results) -> None:
     if limit is not None and limit <= FAR * widest:
         shown.append(limit * geometry.circle())
         axes.plot(*shown[-1].T, **style.LIMIT)
+    elif limit is not None:
+        style.off_scale(axes, f"required ≤ {style.number(limit)}°")
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
         mark: dict[str, Any] = {

@@ -276,6 +276,12 @@ def log_angles(axes: Axes, low: float, high: float) -> None:
     axes.grid()
 
 
+def off_scale(axes: Axes, text: str) -> None:
+    """An arrow at the right edge of a panel towards a limit beyond it, with its ``text``."""
+    look: dict[str, Any] = {"ha": "right", "va": "bottom", "color": INK, "fontsize": SMALL}
+    axes.text(0.99, 0.02, f"{text} →", transform=axes.transAxes, **look)
+
+
 def number(value: float) -> str:
     """A number with `FIGURES` significant figures."""
     return digits(value, FIGURES)

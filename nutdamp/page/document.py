@@ -191,7 +191,8 @@ class Panel(NamedTuple):
 class Strip(NamedTuple):
     """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
 
-    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left
+    ``cones``: the scale has room for the angles of the cones; ``outside``: a required nutation that
+    lies beyond it. ``bars``: row of the channel, left
     and width of each firing; ``closed``: left and width of times without firing.
     """
 
@@ -199,6 +200,7 @@ class Strip(NamedTuple):
     angles: Scale
     zero: float
     required: float | None
+    cones: bool
     outside: str
     channels: tuple[str, ...]
     bars: tuple[tuple[int, float, float], ...]
@@ -303,12 +305,13 @@ UNCONTROLLED = Control()  # configuration control of a page without any entry
 
 class Bar(NamedTuple):
     """Shares of a limit that the nominal value and that of the cases take, NaN where one is not
-    known.
+    known; ``inner``: the limit is the least value.
     """
 
     nominal: float
     cases: float
     met: bool
+    inner: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,6 +52,10 @@ SPHERE = 10_000  # length of a unit vector of the globe as whole numbers: 0.006 
 ANGLE_DIGITS = 4  # decimals of degrees; more where the largest nutation has not so many figures
 # largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
 FAR = 4.0
+APART = 10.0
+"""Largest angle of the cones over the nutation that its scale has room for: of a despun body with a
+wheel they measure 90 deg.
+"""
 END = 0.03  # radius of the mark of the end of the spin axis over half the side of that panel
 NONE = -(10**8)  # entry of a row for an angle that does not exist
 QUICK, UNHURRIED, SLOW = (
@@ -378,7 +382,10 @@ def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale
 def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
     """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
     spacecraft = flown.spacecraft
-    angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
+    cones = np.degrees(np.concatenate([track.body_cone, track.space_cone]))
+    theta = np.degrees(track.nutation)
+    apart = float(np.abs(cones).max()) > APART * max(float(theta.max()), geometry.LEAST)
+    angles = np.concatenate([theta, [0.0]] if apart else [theta, cones, [0.0]])
     low, high = float(angles.min()), float(angles.max())
     margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
     low = low - margin
@@ -409,6 +416,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         ),
         zero=rise(0.0),
         required=rise(level) if low < level < high else None,
+        cones=not apart,
         outside="" if required is None or low < level < high else limit_text(math.radians(level)),
         channels=channels,
         bars=tuple(

@@ -313,7 +313,8 @@ def report_page(
 def _bar(line: Line) -> document.Bar:
     """Bar of a bound."""
     dispersed = math.nan if line.dispersed is None else float(line.bound.used(line.dispersed))
-    return document.Bar(float(line.bound.used(line.nominal)), dispersed, line.met)
+    nominal = float(line.bound.used(line.nominal))
+    return document.Bar(nominal, dispersed, line.met, line.bound.inner)
 
 
 SHOWN = 8  # pulses on the first screen; of more the first and the last

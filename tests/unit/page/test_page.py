@@ -1136,6 +1136,16 @@ def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
     strip, (low, high) = moving.strip_of(made, made.sampled(200, 20.0), 20.0)
     assert (low < degrees < high) == (strip.required is not None) == (degrees < 1.0)
     assert strip.outside == ("" if degrees < 1.0 else "50 deg")
+    assert strip.cones
+
+
+def test_cones_that_dwarf_the_nutation_are_not_on_its_scale() -> None:
+    """A despun body turns about an axis square to its own: μ is 90°, whatever θ is."""
+    body = nutdamp.load(places.CONFIGS / "despun-comsat.yaml")
+    made = planning.plan(body, "two-pulse").flight
+    strip, (low, high) = moving.strip_of(made, made.sampled(200, 60.0), 60.0)
+    assert not strip.cones
+    assert -0.1 < low < 0.0 < 0.5 < high < 0.6
 
 
 def test_the_strip_has_the_times_without_firings() -> None:
