@@ -156,8 +156,10 @@ def _templates() -> Environment:
     return environment
 
 
-WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
-"""Text in which no line may break: an option of a command, a relation with its number and unit."""
+WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?|\d{4}-\d\d-\d\d[\dT:.Z]*)")
+"""Text in which no line may break: an option of a command, a relation with its number and unit, a
+date.
+"""
 
 
 def _whole(text: str) -> Markup:
@@ -271,7 +273,7 @@ def report_page(
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
-            title=control.title or _title(spacecraft),
+            title=_titled(control.title, spacecraft),
             control=control,
             source=f"input {repeat.digest[:8]}" if repeat.digest else "",
             state=judged.light.value,
@@ -371,7 +373,10 @@ def _cases_of(compared: Comparison) -> Dispersion | None:
     return dispersion
 
 
-def _title(spacecraft: Spacecraft) -> str:
+def _titled(title: str, spacecraft: Spacecraft) -> str:
+    """Title of the page, which names the spacecraft whatever ``title`` is given."""
+    if title:
+        return title if spacecraft.name in title else f"{spacecraft.name} · {title}"
     aims = []
     if spacecraft.tilt > NO_NUTATION:
         aims.append(f"damp {math.degrees(spacecraft.tilt):.4g}° nutation")
