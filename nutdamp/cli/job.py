@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 
 DEFAULT_FILE = "spacecraft.yaml"
-FIGURES = ("overview", "motion")  # pictures that ``--plot`` can draw, the default first
+FIGURES = ("overview", "motion")  # pictures of a flight that ``--plot`` can draw, the default first
 
 
 quiet_option = click.option(

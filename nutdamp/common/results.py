@@ -105,7 +105,8 @@ class Drawn:
         """Matplotlib figure that the command of this result draws with ``--plot``, by its name if
         it has several.
 
-        Of plans and flights that is ``overview`` (the default) or ``motion``.
+        Of plans and flights that is ``overview`` (the default) or ``motion``, of plans also
+        ``acceptance``.
         Raises BadRequest for other names, MissingExtra without matplotlib, Infeasible for a plan
         without a schedule.
         """

@@ -199,6 +199,13 @@ def on_sky(plane: Vector, directions: Vector) -> Vector:
     return np.asarray(local[:, :2] * scale[:, None], dtype=np.float64)
 
 
+def off_sky(plane: Vector, angles: Vector) -> Vector:
+    """Directions (n, 3) of ``angles`` (n, 2) in degrees, the inverse of `on_sky`."""
+    turns = np.radians(angles)
+    away = np.hypot(*turns.T)[:, None]
+    return np.asarray(np.cos(away) * plane[2] + np.sinc(away / math.pi) * turns @ plane[:2])
+
+
 def pole_path(track: Track) -> Vector:
     """(n, 2): ω1 and ω2 in deg/s, the pole curve (Magnus 1970 fig. 5)."""
     return np.asarray(np.degrees(track.rates[:, :2]), dtype=np.float64)

@@ -107,6 +107,7 @@ def svg(figure: Figure, *, titled: bool = True) -> str:
 
 FILMS = ("gif", "mp4")
 
+TALL = 0.75  # height of a frame over its width: square panels of half the width above a strip
 INCHES = 8.0  # width of the sheet that fills a frame, inches: more pixels only make it finer
 
 LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
@@ -242,7 +243,7 @@ class Scene:
         rows[0] = 0  # before what is fired at once
         self.rates, self.quaternions = track.rates[rows], track.quaternion[rows]
         # Even numbers of pixels: video is coded in blocks.
-        self.figure = style.sheet(INCHES, 0.6 * INCHES)
+        self.figure = style.sheet(INCHES, TALL * INCHES)
         self.figure.set_dpi(width // 2 * 2 / INCHES)
         self.canvas = FigureCanvasAgg(self.figure)
         self.path = geometry.drawn(flight, track)
@@ -251,7 +252,7 @@ class Scene:
         self._changing: list[Artist] = []
         # The parts that do not move, with room for those that do.
         figure = self.figure
-        grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
+        grid = figure.add_gridspec(2, 2, height_ratios=[3.0, 1.0])
         self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
         self.strip = figure.add_subplot(grid[1, :])
         some = np.unique(

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nutdamp.figures import geometry, sphere, style
-from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN, TURNED
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
@@ -53,23 +54,42 @@ the panel.
 """
 
 
+NO_OUTLINES: Mapping[str, Vector] = MappingProxyType({})  # of an axis track without a verdict
+
+
 @style.styled()
-def flight_figure(name: str, flight: Flight, track: Track, judged: Verdict | None = None) -> Figure:
+def flight_figure(
+    name: str,
+    flight: Flight,
+    track: Track,
+    judged: Verdict | None = None,
+    box: Callable[[Axes], None] | None = None,
+) -> Figure:
     """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for
     others.
 
-    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn.
+    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``box`` draws
+    the first panel of the overview of a plan, in place of the pole curve.
     Raises MissingExtra without matplotlib.
     """
-    return _finished(DRAWN[name], flight, track, judged)
+    draw = DRAWN[name]
+    return _finished(partial(draw, box=box) if draw is overview else draw, flight, track, judged)
 
 
 @style.styled()
-def history_figure(
-    flight: Flight, track: Track, judged: Verdict | None = None, *, narrow: bool = False
+def course_figure(
+    flight: Flight,
+    track: Track,
+    judged: Verdict | None = None,
+    outlines: Mapping[str, Vector] = NO_OUTLINES,
+    *,
+    narrow: bool = False,
 ) -> Figure:
-    """Nutation, firings and rates over time, as on the report; ``narrow``: for a phone."""
-    return _finished(partial(history, narrow=narrow), flight, track, judged)
+    """Axis track with the ``outlines`` of `studies.accepted` above nutation and firings, as on the
+    first screen of the report; ``narrow``: for a phone.
+    """
+    draw = partial(course, outlines=outlines, narrow=narrow)
+    return _finished(draw, flight, track, judged)
 
 
 def _finished(
@@ -117,9 +137,10 @@ def title(flight: Flight) -> str:
     )
 
 
-def overview(flight: Flight, track: Track) -> Figure:
+def overview(flight: Flight, track: Track, *, box: Callable[[Axes], None] | None = None) -> Figure:
     """Motion, and the globe where it has something to show, above history."""
-    sizes = [*_courses(flight, track).values()]
+    courses = _courses(flight, track)
+    sizes = [*courses.values()]
     ratios = [1.0, ROOM if geometry.momentum_inset(flight, track) is not None else 1.0]
     width = 9.6
     tall = TALL
@@ -131,11 +152,15 @@ def overview(flight: Flight, track: Track) -> Figure:
     figure = style.sheet(width, tall + 1.6 + sum(sizes))
     shape: dict[str, Any] = {"height_ratios": [tall, *sizes], "width_ratios": ratios}
     grid = figure.add_gridspec(1 + len(sizes), len(ratios), **shape)
-    _pole_curve(figure.add_subplot(grid[0, 0]), flight, track)
+    first = figure.add_subplot(grid[0, 0])
+    if box is None:
+        _pole_curve(first, flight, track)
+    else:
+        box(first)
     _axis_track(figure.add_subplot(grid[0, 1]), flight, track)
     if globe:
         sphere.draw_globe(figure.add_subplot(grid[0, 2]), flight, track)
-    _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track)
+    _draw_courses(figure, [grid[row + 1, :] for row in range(len(sizes))], flight, track, courses)
     return figure
 
 
@@ -163,9 +188,11 @@ def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     axes.set(xlabel=f"ω1, °/s{geometry.pole_note(flight)}", ylabel="ω2, °/s", title=title)
 
 
-def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
+def _axis_track(
+    axes: Axes, flight: Flight, track: Track, outlines: Mapping[str, Vector] = NO_OUTLINES
+) -> None:
     """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus
-    1970 fig. 6-8).
+    1970 fig. 6-8), with ``outlines`` of where H may end.
     """
     path, momentum = geometry.sky_paths(flight, track)
     target = geometry.sky_target(flight, track)
@@ -173,6 +200,8 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     _path(axes, flight, track, path)
     places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     style.target(axes, target)
+    for name, outline in outlines.items():
+        axes.plot(*outline.T, **ACCEPTED[name])
     middle, half = style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
     if small is None:
         style.add(axes, "H", places[0], TURNED, role="vital")
@@ -196,6 +225,13 @@ def _axis_track(axes: Axes, flight: Flight, track: Track) -> None:
         axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
     x, y, sense = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
+
+
+ACCEPTED: dict[str, dict[str, Any]] = {
+    "limit": {**style.LIMIT, "label": "H may end within"},
+    "contour": {"color": MOMENTUM, "linewidth": 1.5, "label": "H ends within, cases required"},
+}
+"""Looks of the lines of `studies.accepted`."""
 
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
@@ -368,19 +404,25 @@ FULL, PALE = 0.9, 0.35
 they do not.
 """
 
+RATES = (("ω1", MOTION, (0, (6, 1.5, 1, 1.5))), ("ω2", INK, (0, (4, 1.5))))
+"""Rates across the axis, with colours and dashes: θ alone is a blue line without a gap."""
+
 BAR = 0.46  # height of a bar; the distance between two rows is 1
 CHANGES = 1e-3  # share of the largest ω3 from which on its change is drawn
 
 
-def _courses(flight: Flight, track: Track) -> dict[Callable[[Axes, Flight, Track], None], float]:
-    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2, and ω3
-    where it changes.
+def _courses(
+    flight: Flight, track: Track, *, rates: bool = True
+) -> dict[Callable[[Axes, Flight, Track], None], float]:
+    """The panels over time and the height of each, inches: nutation, firings, ω1 and ω2 for
+    ``rates``, and ω3 where it changes.
     """
     spin = track.rates[:, 2]
     courses: dict[Callable[[Axes, Flight, Track], None], float] = {nutation_history: 1.9}
     for height in firings_height(flight):
         courses[lambda axes, flight, track: firings(axes, flight, float(track.t[-1]))] = height
-    courses[_rate_history] = 1.5
+    if rates:
+        courses[_rate_history] = 1.5
     if float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max()):
         courses[_spin_history] = 0.9
     return courses
@@ -394,26 +436,32 @@ def firings_height(flight: Flight) -> list[float]:
     return [0.3 + 0.36 * rows] if rows else []
 
 
-def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
-    """Nutation, firings and rates over one time axis; ``narrow``: for a phone."""
-    sizes = [*_courses(flight, track).values()]
-    figure = style.sheet(style.PHONE if narrow else 7.4, 1.6 + sum(sizes))
-    grid = figure.add_gridspec(len(sizes), 1, height_ratios=sizes)
-    _draw_courses(figure, [grid[row] for row in range(len(sizes))], flight, track)
+def course(flight: Flight, track: Track, *, outlines: Mapping[str, Vector], narrow: bool) -> Figure:
+    """Axis track above nutation, firings and changing spin; ``narrow``: for a phone."""
+    courses = _courses(flight, track, rates=False)
+    sizes = [*courses.values()]
+    figure = style.sheet(style.PHONE if narrow else 5.2, 5.0 + sum(sizes))
+    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.6, *sizes])
+    _axis_track(figure.add_subplot(grid[0]), flight, track, outlines)
+    _draw_courses(figure, [grid[row + 1] for row in range(len(sizes))], flight, track, courses)
     return figure
 
 
 def _draw_courses(
-    figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track
+    figure: Figure,
+    cells: Sequence[SubplotSpec],
+    flight: Flight,
+    track: Track,
+    courses: Iterable[Callable[[Axes, Flight, Track], None]],
 ) -> None:
-    """The panels over time in ``cells`` of a figure, from above, with their legend."""
+    """The panels over time in ``cells`` of a figure, from above, with the legend of all panels."""
     panels: list[Axes] = []
-    for cell, draw in zip(cells, _courses(flight, track), strict=True):
+    for cell, draw in zip(cells, courses, strict=True):
         panels.append(figure.add_subplot(cell, sharex=panels[0] if panels else None))
         draw(panels[-1], flight, track)
         panels[-1].tick_params(labelbottom=len(panels) == len(cells))
     panels[-1].set_xlabel(TIME)
-    style.legend(figure, panels)
+    style.legend(figure, figure.axes)
 
 
 def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
@@ -431,6 +479,11 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
     _bands(axes, flight, track)
     style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
+    ended = float(angles[-1])
+    mark = "o" if ended > low else "v"  # below the scale
+    axes.plot(
+        track.t[-1], max(ended, low), mark, color=MOTION, markerfacecolor=PAPER, clip_on=False
+    )
     last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
     axes.set_title(last, loc="right", color=INK, **style.NOTE)
 
@@ -438,10 +491,10 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
 def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
-    axes.plot(track.t, rates[:, 0], color=MOTION, linewidth=width, label="ω1")
-    axes.plot(
-        track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2"
-    )
+    for row, (name, colour, dashes) in enumerate(RATES):
+        axes.plot(
+            track.t, rates[:, row], color=colour, linewidth=width, linestyle=dashes, label=name
+        )
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
     axes.set_ylim(-half, half)
     _bands(axes, flight, track)

@@ -5,19 +5,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.control_loop.budget import DAY, Budget
+from nutdamp.control_loop.budget import DAY, YEAR, Budget
 from nutdamp.control_loop.evaluation import LoopPlan
-from nutdamp.control_loop.sensor import Signal
 from nutdamp.figures import style
+from nutdamp.figures.geometry import ticks
 from nutdamp.figures.overview import EDGE, TIME, firings, firings_height, title
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import GYRO
-from nutdamp.spacecraft.model import Vector
 from nutdamp.views.loop import described
 
 if TYPE_CHECKING:
@@ -27,16 +26,8 @@ if TYPE_CHECKING:
     from nutdamp.estimation.results import Estimate, Fitted
     from nutdamp.estimation.search import Fit
 
-SAMPLES = 3000  # largest number of samples of the sensor drawn
-BLOCK = 4096  # samples evaluated together
+SAMPLES = 3000  # rows of the nutation of a run
 DECADES = 5.0  # largest number of decades of the nutation on its log axis
-
-FIRST, EARLY, TURNS = 4, 0.2, 4.0
-"""Firings in this share of the run, and periods of the nutation, that the enlarged first seconds
-hold.
-"""
-
-SHORT = 0.5  # share of the run from which on its first seconds are not drawn a second time
 
 LINES = ((MOTION, "-"), (MOMENTUM, "--"), (GREY, "-."), (MOTION, ":"))
 """Colour and style of the pairs of thresholds whose limit cycles are drawn."""
@@ -48,99 +39,71 @@ ROWS = 600
 
 @style.styled()
 def loop_figure(plan: LoopPlan) -> Figure:
-    """Signal of the sensor, nutation with thresholds, and firings: the whole run, and beside it its
-    first seconds.
-    """
+    """Nutation with thresholds and dead band above the firings, and what holding it takes."""
     run = plan.flown_run
-    first = first_seconds(plan)
-    spans = [run.until, first] if first < SHORT * run.until else [run.until]
-    heights = [1.8, 1.8, *firings_height(run.flight)]
-    figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
-    shape: dict[str, Any] = {"height_ratios": heights, "width_ratios": [1.5, 1.0][: len(spans)]}
-    panels = figure.subplots(len(heights), len(spans), squeeze=False, sharex="col", **shape)
-    for column, until in zip(panels.T, spans, strict=True):
-        _signal(column[0], plan, until)
-        _nutation(column[1], plan, until)
-        if run.fired:
-            firings(column[2], run.flight, until)
-        column[0].set_xlim(-EDGE * until, until)
-        column[-1].set_xlabel(TIME)
-    if len(spans) > 1:
-        panels[0, 1].set_title(f"The first {style.number(first)} s")
-    style.legend(figure, list(panels.ravel()))
+    unit, seconds = time_unit(run.until)
+    heights = [2.6, *firings_height(run.flight)]
+    figure = style.sheet(7.4, 1.8 + sum(heights))
+    shape: dict[str, Any] = {"height_ratios": heights, "sharex": True}
+    panels = figure.subplots(len(heights), 1, squeeze=False, **shape)[:, 0]
+    _nutation(panels[0], plan)
+    if run.fired:
+        firings(panels[1], run.flight, run.until)
+    panels[0].set_xlim(-EDGE * run.until, run.until)
+    panels[0].set_title(upkeep(plan), loc="right", **style.NOTE)
+    if seconds > 1.0:  # the panels are drawn over seconds
+        times = np.array(ticks(0.0, run.until / seconds, 7))
+        panels[-1].set_xticks(seconds * times, [f"{time:g}" for time in times])
+    panels[-1].set_xlabel(f"time, {unit}")
+    style.legend(figure, list(panels))
     loop = described(run.loop, thresholds=False).replace(" deg", "°")
     style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
     style.settle(figure)
     return figure
 
 
-def first_seconds(plan: LoopPlan) -> float:
-    """End of the first seconds of a run, s: some firings, and some periods of the nutation."""
-    run = plan.flown_run
-    ends = [
-        firing.pulse.end for firing in run.fired[:FIRST] if firing.pulse.end < EARLY * run.until
-    ]
-    return min(run.until, max(1.2 * max(ends, default=0.0), TURNS * plan.spacecraft.body_period))
+def time_unit(until: float) -> tuple[str, float]:
+    """Unit of a time axis to ``until`` s, and its seconds."""
+    if until > 2.0 * DAY:
+        return "days", DAY
+    return ("hours", 3600.0) if until > 7200.0 else ("s", 1.0)
 
 
-def _signal(axes: Axes, plan: LoopPlan, until: float) -> None:
-    run, sensor = plan.flown_run, plan.flown_run.loop.sensor
-    if sensor.rate is None:
-        times = np.linspace(0.0, until, SAMPLES)
-        values = Signal(plan.spacecraft, sensor, run.key).shown(run.flight.motion(times)[0])
-    else:
-        times, values = _samples(plan, sensor.rate, until)
-    scale = 180.0 / math.pi if sensor.kind == GYRO else 1.0
-    names = (
-        ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
-    )
-    for column, (name, colour) in enumerate(zip(names, (MOTION, INK), strict=False)):
-        axes.plot(times, scale * values[:, column], ".", markersize=1.6, color=colour, label=name)
-    axes.set_ylabel("signal, °/s" if sensor.kind == GYRO else "signal, m/s²")
-    axes.grid()
-
-
-def _samples(plan: LoopPlan, rate: float, until: float) -> tuple[Vector, Vector]:
-    """Some of the samples, evenly, with the noise that the loop saw; those within firings are left
-    out.
+def upkeep(plan: LoopPlan) -> str:
+    """Pulses a day and propellant a year of the run from the first quiet on; empty where it never
+    fell quiet, or fired once since: of one firing there is no rate.
     """
     run = plan.flown_run
-    count = math.floor(until * rate) + 1
-    shown_at = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
-    signal = Signal(plan.spacecraft, run.loop.sensor, run.key)
-    times = []
-    values = []
-    for block in range(0, count, BLOCK):
-        numbers = shown_at[(shown_at >= block) & (shown_at < block + BLOCK)]
-        if len(numbers):
-            times.append(np.asarray(numbers / rate, dtype=np.float64))
-            values.append(signal.sampled(numbers, signal.shown(run.flight.motion(times[-1])[0])))
-    instants = np.concatenate(times)
-    quiet = np.ones(len(instants), dtype=bool)
-    for firing in run.fired:
-        quiet &= (instants < firing.pulse.start) | (instants > firing.pulse.end)
-    return instants[quiet], np.concatenate(values)[quiet]
+    later = [f.pulse for f in run.fired if run.settled is not None and f.pulse.t > run.settled]
+    if run.settled is None or len(later) < 2:
+        return ""
+    lasts = run.until - run.settled
+    text = f"from first quiet on: {style.number(len(later) / lasts * DAY)} pulses a day"
+    masses = [pulse.propellant for pulse in later if pulse.propellant is not None]
+    if len(masses) < len(later):
+        return text
+    return f"{text}, {style.number(math.fsum(masses) / lasts * YEAR)} kg a year"
 
 
-def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
-    """Nutation on a log axis, thresholds, and the nutation seen at each firing."""
+def _nutation(axes: Axes, plan: LoopPlan) -> None:
+    """Nutation on a log axis, thresholds, dead band, and the nutation seen at each firing."""
     run = plan.flown_run
-    track = run.flight.sampled(SAMPLES, until)
+    track = run.flight.sampled(SAMPLES, run.until)
     angles = np.degrees(track.nutation)
     start, stop = math.degrees(run.loop.start), math.degrees(run.loop.stop)
+    band = math.degrees(plan.band.most)
     most = max(float(angles.max()), start)
-    low = max(0.5 * min(float(angles.min()), stop or start), most * 10.0**-DECADES)
+    lowest = min(float(angles.min()), stop or start, band or start)
+    low = max(0.5 * lowest, most * 10.0**-DECADES)
     axes.plot(track.t, np.maximum(angles, 0.1 * low), color=MOTION, label="nutation θ")
-    seen = [
-        (firing.pulse.t, max(math.degrees(firing.seen), low))
-        for firing in run.fired
-        if firing.pulse.t <= until
-    ]
+    seen = [(firing.pulse.t, max(math.degrees(firing.seen), low)) for firing in run.fired]
     if seen:
         axes.plot(*np.transpose(seen), "x", color=PULSE, markersize=4, label="θ seen at a firing")
     axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
     if stop > 0.0:
         axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")
+    shade: dict[str, Any] = {"facecolor": GREY, "alpha": 0.16, "linewidth": 0.0}
+    axes.axhspan(0.1 * low, max(band, 0.1 * low), label="dead band", **shade)
     style.log_angles(axes, low, 2.0 * most)
 
 
@@ -160,11 +123,7 @@ def budget_figure(budget: Budget) -> Figure:
     if until is not None and math.isfinite(until):
         size = max(size, 1.2 * until)
     size = size or 3.0 / max(abs(growth), 1e-300)
-    unit, seconds = "s", 1.0
-    if size > 2.0 * DAY:
-        unit, seconds = "days", DAY
-    elif size > 7200.0:
-        unit, seconds = "hours", 3600.0
+    unit, seconds = time_unit(size)
     figure = style.sheet(7.4, 4.0)
     axes = figure.subplots()
     times = np.linspace(0.0, size, ROWS)
@@ -220,18 +179,30 @@ def fit_figure(fitted: Fitted) -> Figure:
     from nutdamp.estimation.results import estimates
 
     fit = fitted.core
-    signals = fit.model.signals
-    figure = style.sheet(8.6, max(4.8, 1.2 + 1.15 * len(signals)))
-    sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0])
-    left = sides[0].subgridspec(len(signals), 1).subplots(sharex=True, squeeze=False)[:, 0].tolist()
-    white, pulls = sides[1].subgridspec(2, 1).subplots(squeeze=False)[:, 0]
-    for index, axes in enumerate(left):
+    every = range(len(fit.model.signals))
+    shown = [index for index in every if not _rounding(fit, index)] or [0]
+    exact = [name for index, name in enumerate(fit.model.signals) if index not in shown]
+    pulled = [row for row in estimates(fit, 0.0) if row.change is not None and row.prior]
+    correlated = [index for index in shown if len(fit.whiteness(index))]
+    aside = bool(correlated) + bool(pulled)
+    figure = style.sheet(8.6 if aside else 5.4, max(4.8, 1.2 + 1.15 * len(shown)))
+    sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0 if aside else 1e-3])
+    left = sides[0].subgridspec(len(shown), 1).subplots(sharex=True, squeeze=False)[:, 0].tolist()
+    for index, axes in zip(shown, left, strict=True):
         _residuals(axes, fit, index)
-    left[0].set_title("Residuals: data less fit")
+    times = fit.model.times
+    left[0].set(title="Residuals: data less fit", xlim=(times.min(), times.max()))
     left[-1].set_xlabel(TIME)
-    _autocorrelation(white, fit)
-    _pulls(pulls, [row for row in estimates(fit, 0.0) if row.change is not None and row.prior])
-    style.legend(figure, [*left, white])
+    if exact:
+        left[-1].set_xlabel(f"{TIME}\nonly rounding: {', '.join(exact)}")
+    right: list[Axes] = []
+    if aside:
+        right = sides[1].subgridspec(aside, 1).subplots(squeeze=False)[:, 0].tolist()
+    if correlated:
+        _autocorrelation(right[0], fit, correlated)
+    if pulled:
+        _pulls(right[-1], pulled)
+    style.legend(figure, [*left, *right])
     shape = "symmetric" if fit.model.body(fit.named).inertia.symmetric else "triaxial"
     count = int(np.count_nonzero(fit.used))
     style.heading(
@@ -282,19 +253,17 @@ def _rounding(fit: Fit, index: int) -> bool:
     return bool(largest <= ROUNDING * float(fit.noise[index]))
 
 
-def _autocorrelation(axes: Axes, fit: Fit) -> None:
-    """Autocorrelation of the residuals of all signals, with the band of white noise."""
+def _autocorrelation(axes: Axes, fit: Fit, shown: Sequence[int]) -> None:
+    """Autocorrelation of the residuals of the signals ``shown``, with the band of white noise."""
     axes.set_title("Autocorrelation of the residuals")
     bands = []
-    for index, (name, (colour, line)) in enumerate(zip(fit.model.signals, LOOKS, strict=False)):
+    for index in shown:
         correlations = fit.whiteness(index)
-        if len(correlations) and not _rounding(fit, index):
-            lags = np.arange(1, len(correlations) + 1)
-            axes.plot(lags, correlations, color=colour, linestyle=line, linewidth=1.0, label=name)
-            bands.append(1.96 / np.sqrt(int((fit.used & (fit.model.signal == index)).sum())))
-    if not bands:
-        style.words(axes, "too few samples, or only rounding")
-        return
+        lags = np.arange(1, len(correlations) + 1)
+        colour, line = LOOKS[index % len(LOOKS)]
+        name = fit.model.signals[index]
+        axes.plot(lags, correlations, color=colour, linestyle=line, linewidth=1.0, label=name)
+        bands.append(1.96 / np.sqrt(int((fit.used & (fit.model.signal == index)).sum())))
     axes.axhspan(
         -max(bands),
         max(bands),
@@ -314,9 +283,6 @@ def _pulls(axes: Axes, rows: list[Estimate]) -> None:
     both over the sigma of the file.
     """
     axes.set_title("Pulls: change from the file")
-    if not rows:
-        style.words(axes, "the file has no tolerances of what is fitted")
-        return
     places = -np.arange(len(rows), dtype=float)
     changes = np.clip([row.change or 0.0 for row in rows], -FARTHEST, FARTHEST)
     sigmas = [min(row.sigma / (row.prior or 1.0), FARTHEST) for row in rows]

@@ -28,7 +28,7 @@ ASIDE = math.radians(
 )  # the spin axis leans to the right at t = 0, this far round from the viewer
 MOVES = math.radians(2.0)  # motion of the spin axis below which it is a point on the globe
 
-WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
+WIDE, DRAWN = math.radians(20.0), math.radians(42.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
 SPACE, BODY = 0.28, 0.15  # opacity of the cones: distinguished in grey print too
@@ -146,7 +146,8 @@ def _draw_keep(
     Yields the label of each, and its place (2,).
     """
     (place,), (height,) = looked.seen(direction)
-    axes.plot(*place, "o", color=INK, markersize=6, markerfacecolor="none", zorder=4)
+    axes.plot(*place, "o", color=INK, markersize=7, markerfacecolor="none", zorder=4)
+    axes.plot(*place, ".", color=INK, markersize=3, zorder=4)  # as astronomers mark the Sun
     yield (f"{cone.name} (behind)" if height < 0.0 else cone.name), place
     square = attitude.square_to(direction)
     bounds = [("≥", cone.least, cone.least > 0.0), ("≤", cone.most, cone.most < math.pi)]

@@ -1,7 +1,8 @@
-"""Pictures of studies: dispersed cases and fronts of cost over time."""
+"""Pictures of studies: dispersed cases, the acceptance box, and fronts of cost over time."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from textwrap import fill
@@ -9,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.common.numerics import down
+from nutdamp.common.numerics import RPM, down
 from nutdamp.figures import geometry, style
-from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION
+from nutdamp.figures.style import FIRED, GREY, INK, MISSED, MOMENTUM, MOTION, PAPER, TURNED
 from nutdamp.flight.propagation import model_name
 from nutdamp.montecarlo.statistics import VECTORS, Distribution
 from nutdamp.montecarlo.study import EARLY, Results
@@ -20,17 +21,19 @@ from nutdamp.planning.tradeoff import Front, Trade, numbered
 from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.text import cost as written
 from nutdamp.views.text import text
 from nutdamp.views.trade import FAILS, fails, front_name, missing, schemes_of
-from nutdamp.views.verdict import exact_percent, stated
+from nutdamp.views.verdict import exact_percent, share_text, spent, stated
+from nutdamp.views.verdict import limit as stated_limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults
+    from nutdamp.flight.propagation import Flight
     from nutdamp.planning.screening import Dispersion
 
 
@@ -110,6 +113,8 @@ def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) 
             else None
         )
         draw_distribution(axes, distribution, f"{name}, °", shown)
+        if limit is not None and shown is None:
+            style.off_scale(axes, f"required ≤ {style.number(limit)}°")
         axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
         axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
         missed = part in lines and not lines[part].met
@@ -137,7 +142,6 @@ def draw_distribution(
     )
     if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
         axes.set_xscale("log")
-        style.log_axis(axes.xaxis)
         axes.set_xlim(left=math.degrees(max(distribution.minimum, high * 10.0**-DECADES)))
         name += " (log)"
     else:
@@ -145,6 +149,8 @@ def draw_distribution(
     if limit is not None:
         axes.axvline(limit, **style.LIMIT)
         axes.set_xlim(right=max(axes.get_xlim()[1], 1.04 * limit))
+    if axes.get_xscale() == "log":
+        style.log_axis(axes.xaxis)
     axes.set(xlabel=name, ylabel="cases within, %", ylim=(0.0, 104.0))
     axes.grid()
 
@@ -230,6 +236,8 @@ def _momentum(axes: Axes, results: Results) -> None:
     if limit is not None and limit <= FAR * widest:
         shown.append(limit * geometry.circle())
         axes.plot(*shown[-1].T, **style.LIMIT)
+    elif limit is not None:
+        style.off_scale(axes, f"required ≤ {style.number(limit)}°")
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
         mark: dict[str, Any] = {
@@ -252,6 +260,181 @@ def _momentum(axes: Axes, results: Results) -> None:
     axes.set_title(f"Where H ends, about {about}\n{sense}", **TITLE)
 
 
+def accepted(flight: Flight, judged: Verdict) -> dict[str, Vector]:
+    """(n, 2) each, degrees on the sky of the axis track: the ``limit`` of the end of H, and the
+    ``contour`` that holds the share of the cases that must comply; without those that are unknown.
+    """
+    spacecraft = flight.spacecraft
+    start = spacecraft.momentum
+    sky = geometry.sky_plane(flight, start)
+    goal = spacecraft.goal.axis
+    about = sky if goal is None else geometry.sky_plane(flight, goal)
+    outlines = {}
+    limit = style.limit_of(spacecraft, requirements.aim(spacecraft))
+    if limit is not None:
+        outlines["limit"] = limit * geometry.circle()
+    if judged.results is not None:
+        assert isinstance(judged.results, Results)
+        outlines["contour"] = ellipse(momentum_cases(judged.results), judged.results.probability)
+    return {
+        name: geometry.on_sky(sky, geometry.off_sky(about, angles))
+        for name, angles in outlines.items()
+    }
+
+
+REACH, SPARE = 3.0, 1.25
+"""Largest and least end of an axis of the acceptance box over its limit: farther schemes are arrows
+at the edge, and a limit alone leaves room beside its label.
+"""
+
+SPOTS = 30.0  # places along an axis of the acceptance box whose points have one label
+
+OTHERS = (TURNED, INK, FIRED, GREY)  # colours of the schemes that are not recommended, in turn
+
+
+@style.styled()
+def acceptance_figure(
+    judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
+) -> Figure:
+    """The box of `acceptance`, for the report and ``plan --figure acceptance``."""
+    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
+    acceptance(figure.subplots(), judged, others)
+    style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
+    style.settle(figure)
+    return figure
+
+
+def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> None:
+    """Nutation left against the value with the tightest other limit, both limits as a box.
+
+    Each scheme is the contour that holds the share of its cases that must comply, or a point
+    without cases; the recommended one, ``judged``, is filled.
+    """
+    bounds = box_bounds(judged)
+    limits = np.array([_in_units(bound, bound.limit) for bound in bounds])
+    regions = [(judged, MOTION, acceptance_contour(judged, bounds))]
+    regions += [
+        (verdict, colour, acceptance_contour(verdict, bounds))
+        for verdict, colour in zip(others, itertools.cycle(OTHERS), strict=False)
+    ]
+    tops = np.array([region.max(axis=0) for _, _, region in regions])
+    within = [np.all(region.min(axis=0) <= REACH * limits) for _, _, region in regions]
+    farthest = np.max(tops[within], axis=0, initial=0.0)
+    bounded = np.isfinite(limits)
+    near = np.clip(1.1 * farthest, SPARE * limits, REACH * limits)
+    ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), geometry.LEAST)
+    corner = np.where(bounded, limits, 2.0 * ends)
+    look: dict[str, Any] = {**style.LIMIT, "label": None}
+    axes.fill_between([0.0, corner[0]], corner[1], color=GREY, alpha=0.12, linewidth=0.0)
+    axes.plot([corner[0], corner[0], 0.0], [0.0, corner[1], corner[1]], **look)
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for verdict, colour, region in reversed(regions):
+        recommended = verdict is judged
+        solid = "-" if verdict.met is not False else (0, (4, 1.5))
+        name = _contender(verdict)
+        beyond = region.min(axis=0) > ends
+        if beyond.any():
+            row = int(beyond[1])
+            nominal = _nominal(verdict, bounds)
+            place = np.minimum(nominal, ends)
+            mark = "^" if beyond[1] else ">"
+            name += f": {_in_words(bounds[row], nominal[row])}"
+        else:
+            place = region[-1]
+            mark = "o"
+        if beyond.any() or len(region) < 3:
+            ground = colour if recommended else "none"
+            look = {"color": colour, "markersize": 7, "markerfacecolor": ground, "clip_on": False}
+            axes.plot(*place, mark, zorder=3, **look)
+            spot = tuple((np.round(place / ends * SPOTS) / SPOTS * ends).tolist())
+            labels.setdefault(spot, []).append(name)
+        else:
+            if recommended:
+                axes.fill(*region.T, color=colour, alpha=0.3, linewidth=0.0)
+            outline = np.vstack([region, region[:1]])
+            axes.plot(*outline.T, color=colour, linestyle=solid, linewidth=1.5)
+            far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
+            style.add(axes, name, np.minimum(far, 0.97 * ends), colour, role="vital")
+    for spot, names in labels.items():
+        style.add(axes, "\n".join(reversed(names)), np.array(spot), INK, role="vital")
+    across, along = map(_bound_axis, bounds)
+    axes.set(xlim=(0.0, ends[0]), ylim=(0.0, ends[1]), xlabel=across, ylabel=along)
+    axes.locator_params(nbins=6)
+    axes.grid()
+    marks = "points: nominal values"
+    if judged.results is not None and judged.cases is not None:
+        marks = f"contours: {exact_percent(judged.cases.probability)} of the cases"
+    width = style.LETTERS * axes.figure.get_figwidth()  # type: ignore[union-attr]
+    title = fill(f"{marks}; filled: recommended", int(width))
+    axes.set_title(f"Acceptance box: what a scheme leaves\n{title}")
+
+
+def box_bounds(judged: Verdict) -> tuple[Bound, Bound]:
+    """The bounds of the acceptance box: nutation left, and the tightest other one at the end.
+
+    Without another one the end of H, which has no limit then.
+    """
+    ends = [line for line in judged.lines if line.bound.keep is None]
+    nutation = next(line.bound for line in ends if line.bound.part is Part.NUTATION)
+    tight = min(
+        (line for line in ends if line.bound is not nutation),
+        key=lambda line: (not line.bound.required, line.room),
+        default=None,
+    )
+    free = Bound(requirements.aim(judged.spacecraft), math.inf, False)
+    return nutation, free if tight is None else tight.bound
+
+
+def acceptance_contour(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
+    """(n, 2) in the units of `acceptance`: the hull of the cases that use least of both bounds, as
+    many as must comply; one point, of nominal values, without cases.
+
+    It lies within the box where enough cases keep both bounds, and nowhere else.
+    """
+    scale = np.array([_in_units(bound, 1.0) for bound in bounds])
+    if verdict.results is not None and verdict.cases is not None:
+        spreads = [verdict.results.spread(bound) for bound in bounds]
+        if all(hasattr(spread, "values") for spread in spreads):  # not only counted
+            values = np.column_stack([spread.values for spread in spreads])
+            used = np.maximum(*(bound.used(values[:, row]) for row, bound in enumerate(bounds)))
+            count = math.ceil(verdict.cases.probability * len(used))
+            return geometry.hull(scale * values[np.argsort(used, kind="stable")[:count]])
+    return _nominal(verdict, bounds)[None]
+
+
+def _nominal(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
+    """(2,): nominal values in the units of `acceptance`."""
+    assert verdict.flight is not None
+    nominal = {line.bound: line.nominal for line in verdict.lines}
+    values = (nominal.get(bound, verdict.flight.residual.axis_error) for bound in bounds)
+    return np.array([_in_units(*pair) for pair in zip(bounds, values, strict=True)])
+
+
+def _contender(verdict: Verdict) -> str:
+    """Scheme, cost and share of the cases that comply."""
+    share = "" if verdict.cases is None else f", {share_text(verdict.cases)}"
+    return f"{verdict.scheme} {spent(verdict.schedule)}{share}"
+
+
+def _in_units(bound: Bound, value: float) -> float:
+    """A value of a bound's part in deg, of the spin in rpm."""
+    return RPM * value if bound.part is Part.SPIN else math.degrees(value)
+
+
+def _in_words(bound: Bound, value: float) -> str:
+    return f"{style.number(value)}{' rpm' if bound.part is Part.SPIN else '°'}"
+
+
+def _bound_axis(bound: Bound) -> str:
+    """Name of an axis of the acceptance box with its limit."""
+    name = "nutation left" if bound.part is Part.NUTATION else bound.label
+    unit = "rpm" if bound.part is Part.SPIN else "°"
+    if math.isinf(bound.limit):
+        return f"{name}, {unit} (no limit)"
+    word = "required" if bound.required else "damped"
+    return f"{name}, {unit} ({word} {stated_limit(bound).replace(' deg', '°')})"
+
+
 LOOKS = (
     (MOTION, "o", "-"),
     (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))),
@@ -262,22 +445,12 @@ LOOKS = (
 
 SAME_ENDS = (0.02, 0.002)  # relative differences in end and in cost of points that are drawn as one
 WIDTH = 14.0  # characters of a line above the picture in an inch of it
-FEWEST = 3  # ticks of a decade's 1, 2 and 5 below which the axis of time has others
 
 
 REACH = 1.4
 """End of the axis of time over the last end of a schedule: to there its cost holds, as far as the
 horizon reaches.
 """
-
-CROSS: dict[str, Any] = {
-    "color": MISSED,
-    "markersize": 9,
-    "markeredgewidth": 1.4,
-    "linestyle": "",
-    "zorder": 3.8,
-}
-"""Look of an x over the mark of a plan that does not meet the requirement."""
 
 CHOSEN: dict[str, Any] = {
     "color": INK,
@@ -291,13 +464,12 @@ CHOSEN: dict[str, Any] = {
 
 @style.styled()
 def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
-    """End of the last firing against propellant (impulse where that is unknown), numbered as in the
-    table, with the recommended plan among them.
+    """End of the last firing against propellant (impulse where that is unknown) as % over its lower
+    bound, numbered as in the table; hollow where the verdict is not to fly, with the recommended
+    plan among them.
 
     Fronts without points are named, with reasons. ``narrow``: for phones.
     """
-    from matplotlib.ticker import LogLocator, MaxNLocator
-
     spacecraft, fronts, chosen = traded.spacecraft, traded.fronts, traded.recommended
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
@@ -319,32 +491,27 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
     ends += [chosen.pulses.end] if chosen is not None and len(chosen.pulses) else []
     log = min(ends) > 0.0
     axes.set_xscale("log" if log else "linear")
-    scale, unit = (1e3, "propellant, g") if points[0].unit == "kg" else (1.0, "impulse, N m s")
-    reach = max(min(REACH * max(ends), spacecraft.horizon), 1.03 * max(ends))
-    _draw_fronts(axes, spacecraft, fronts, scale, reach)
+    unit = points[0].unit
     proved = [point.bounds.rigorous for point in points]
-    if None not in proved:
-        least = min(scale * value for value in proved if value is not None)
-        name = f"lower bound, {written(down(least) / scale, points[0].unit)}"
-        axes.axhline(least, **{**style.LIMIT, "label": name})
+    bounds = [bound for bound in proved if bound is not None]
+    proven = len(bounds) == len(points)
+    # Below it for certain: the bound is rounded down as on the screen.
+    base = down(min(bounds)) if proven else min(point.cost for point in points)
+    reach = max(min(REACH * max(ends), spacecraft.horizon), 1.03 * max(ends))
+    _draw_fronts(axes, spacecraft, fronts, base, reach)
     if chosen is not None and len(chosen.pulses):
-        place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
+        place = chosen.pulses.end, over(chosen.pulses.cost_in(unit), base)
         ideal = ", ideal impulses" if chosen.pulses.idealised else ""
         other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
         axes.plot(*place, "D", label=f"recommended: {chosen.scheme}{other}", **CHOSEN)
     axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)
     axes.margins(y=0.12)
-    axes.set(xlabel="end of the last firing, s", ylabel=unit)
-    if log:  # ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one
-        low, high = axes.get_xlim()
-        few = (
-            sum(
-                low <= value <= high
-                for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)
-            )
-            < FEWEST
-        )
-        axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if axes.dataLim.y0 < 0.0 else 0.0)
+    name = "propellant" if unit == "kg" else "impulse"
+    least = "the lower bound" if proven else "the cheapest point"
+    axes.set(xlabel="end of the last firing, s")
+    axes.set_ylabel(f"{name} over {least}, {written(base, unit)}, %")
+    if log:
         style.log_axis(axes.xaxis)
     axes.grid(True, which="both")
     style.legend(figure, [axes], 3)
@@ -352,15 +519,20 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
     return figure
 
 
+def over(cost: float, base: float) -> float:
+    """A cost as % over the ``base``."""
+    return 100.0 * (cost / base - 1.0)
+
+
 def _draw_fronts(
-    axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float, reach: float
+    axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], base: float, reach: float
 ) -> None:
     """Step lines to ``reach`` s, with their names, and numbered marks; a schedule of two fronts has
     one mark.
     """
     shown: list[tuple[float, float, list[int]]] = []
     points = [
-        (index, owner, point.plan.pulses.end, scale * point.cost)
+        (index, owner, point.plan.pulses.end, over(point.cost, base))
         for index, owner, point in numbered(fronts)
     ]
     for front, (colour, mark, line) in zip(
@@ -374,7 +546,11 @@ def _draw_fronts(
         # A schedule serves for every later end, until a cheaper one does.
         times, levels = np.repeat([*ends, reach], 2)[1:], np.repeat([*costs, costs[-1]], 2)[:-1]
         axes.plot(times, levels, color=colour, linestyle=line)
-        axes.plot(ends, costs, mark, color=colour, markersize=5, zorder=3.5, clip_on=False)
+        failing = [fails(point) for point in front.points]
+        for end, cost, hollow in zip(ends, costs, failing, strict=True):
+            ground = PAPER if hollow else colour
+            look: dict[str, Any] = {"color": colour, "markerfacecolor": ground, "zorder": 3.5}
+            axes.plot(end, cost, mark, markersize=6, clip_on=False, **look)
         axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
         for index, end, cost in own:
             near = (place for place in shown if math.isclose(end, place[0], rel_tol=SAME_ENDS[0]))
@@ -386,12 +562,7 @@ def _draw_fronts(
                 shown.append((end, cost, [index]))
             else:
                 same[2].append(index)
-    failing = [
-        (point.plan.pulses.end, scale * point.cost)
-        for _, _, point in numbered(fronts)
-        if fails(point)
-    ]
-    if failing:
-        axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
+    if any(fails(point) for _, _, point in numbered(fronts)):
+        axes.plot([], [], "o", color=GREY, markerfacecolor=PAPER, label=f"hollow: {FAILS}")
     for end, cost, numbers in shown:
         style.add(axes, ", ".join(map(str, numbers)), np.array([end, cost]), INK)

@@ -248,7 +248,21 @@ def thinned(count: int, most: int = 24) -> list[int]:
 
 
 def log_axis(axis: Axis) -> None:
-    """Plain numbers at the decades of a log axis, none between them."""
+    """Plain numbers at the decades of a log axis whose limits are set; where these are fewer than
+    two, at 1, 2 and 5 of each, or evenly within part of one.
+    """
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+    low, high = sorted(axis.get_view_interval())
+    for subs in ((1.0,), (1.0, 2.0, 5.0)):
+        locator = LogLocator(subs=subs)
+        within = (low <= tick <= high for tick in locator.tick_values(low, high))
+        if sum(within) > 1:
+            axis.set_major_locator(locator)
+            break
+    else:
+        axis.set_major_locator(MaxNLocator(5))
+        axis.set_minor_locator(NullLocator())
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter("")
 
@@ -260,6 +274,12 @@ def log_angles(axes: Axes, low: float, high: float) -> None:
     log_axis(axes.yaxis)
     axes.set_ylabel("θ, ° (log)")
     axes.grid()
+
+
+def off_scale(axes: Axes, text: str) -> None:
+    """An arrow at the right edge of a panel towards a limit beyond it, with its ``text``."""
+    look: dict[str, Any] = {"ha": "right", "va": "bottom", "color": INK, "fontsize": SMALL}
+    axes.text(0.99, 0.02, f"{text} →", transform=axes.transAxes, **look)
 
 
 def number(value: float) -> str:

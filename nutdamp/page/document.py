@@ -94,8 +94,8 @@ class Points(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """An ``<svg>`` element, its title, a caption, a description, and the ``narrow`` drawing for a
-    phone, if any.
+    """An ``<svg>`` element, its title, if any, a caption, a description, and the ``narrow`` drawing
+    for a phone, if any.
     """
 
     svg: str
@@ -175,7 +175,7 @@ class Scale(NamedTuple):
 
 class Panel(NamedTuple):
     """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within
-    the frame.
+    the frame; ``outlines`` are fixed lines by their kind, as data of SVG paths.
     """
 
     part: str
@@ -185,12 +185,14 @@ class Panel(NamedTuple):
     y: Scale
     zero: tuple[float, float]
     frame: tuple[int, int, int, int] = EDGES
+    outlines: tuple[tuple[str, str], ...] = ()
 
 
 class Strip(NamedTuple):
     """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
 
-    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left
+    ``cones``: the scale has room for the angles of the cones; ``outside``: a required nutation that
+    lies beyond it. ``bars``: row of the channel, left
     and width of each firing; ``closed``: left and width of times without firing.
     """
 
@@ -198,6 +200,7 @@ class Strip(NamedTuple):
     angles: Scale
     zero: float
     required: float | None
+    cones: bool
     outside: str
     channels: tuple[str, ...]
     bars: tuple[tuple[int, float, float], ...]
@@ -300,33 +303,24 @@ def controlled(**entries: str) -> Control:
 UNCONTROLLED = Control()  # configuration control of a page without any entry
 
 
-class Contender(NamedTuple):
-    """One scheme on the first screen: its texts; ``chosen``: it is the one to fly."""
-
-    name: str
-    texts: tuple[str, ...]
-    chosen: bool
-
-
 class Bar(NamedTuple):
-    """A bound with its texts; ``used``: shares of the limit that the nominal value and that of the
-    cases take.
-
-    NaN where one is not known.
+    """Shares of a limit that the nominal value and that of the cases take, NaN where one is not
+    known; ``inner``: the limit is the least value.
     """
 
-    label: str
-    texts: tuple[str, ...]
-    used: tuple[float, ...]
+    nominal: float
+    cases: float
     met: bool
+    inner: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report: title, decision, motion, schemes at a glance, and sections.
+    """A whole report: title, first screen with decision and motion, and sections.
 
     ``state``: value of the `Light` of the verdict; ``broken``: limits that the schedule of a file
-    breaks. ``source``: the beginning of the hash of the input file.
+    breaks. ``source``: the beginning of the hash of the input file. ``bounds`` have a bar in each
+    row; ``pulses``: all, or the first and the last of ``count``.
     """
 
     title: str
@@ -335,12 +329,15 @@ class Page:
     state: str
     headline: tuple[str, str]
     notes: tuple[str, ...]
-    contenders: tuple[Contender, ...]
     made_by: str
     verdict: str = ""
     broken: tuple[str, ...] = ()
-    margins: tuple[Bar, ...] = ()
+    bounds: Sheet | None = None
+    bars: tuple[Bar, ...] = ()
+    pulses: Sheet | None = None
+    count: int = 0
     facts: FactList | None = None
+    acceptance: Block | None = None
     warnings: tuple[str, ...] = ()
     motion: tuple[Block, ...] = ()
     sections: tuple[PageSection, ...] = ()

@@ -12,12 +12,13 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from nutdamp.figures import geometry
+from nutdamp.figures.overview import NO_OUTLINES
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
 from nutdamp.page.document import (
@@ -51,6 +52,11 @@ SPHERE = 10_000  # length of a unit vector of the globe as whole numbers: 0.006 
 ANGLE_DIGITS = 4  # decimals of degrees; more where the largest nutation has not so many figures
 # largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
 FAR = 4.0
+APART = 10.0
+"""Largest angle of the cones over the nutation that its scale has room for: of a despun body with a
+wheel they measure 90 deg.
+"""
+END = 0.03  # radius of the mark of the end of the spin axis over half the side of that panel
 NONE = -(10**8)  # entry of a row for an angle that does not exist
 QUICK, UNHURRIED, SLOW = (
     4.0,
@@ -88,9 +94,11 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
     return tuple(directions)
 
 
-def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
+def moving_of(
+    plan: Plan, craft: str = "SPACECRAFT", outlines: Mapping[str, Vector] = NO_OUTLINES
+) -> Moving:
     """The view of a plan flown through the real pulse widths; ``craft``: words of a command for the
-    spacecraft.
+    spacecraft. ``outlines``: where H may end and ends in cases, degrees on the axis track.
     """
     spacecraft = plan.spacecraft
     named = named_directions(plan.spacecraft)
@@ -101,6 +109,10 @@ def moving_of(plan: Plan, craft: str = "SPACECRAFT") -> Moving:
     samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
     panels, columns, target, rooms = _panels(flown, track, named)
+    end = geometry.sky_paths(flown, track)[0][-1] + END * rooms[1][1] * geometry.circle()
+    lines = {**outlines, "end": end}.items()
+    paths = tuple((kind, _path(placed(outline, *rooms[1]))) for kind, outline in lines)
+    panels = (panels[0], panels[1]._replace(outlines=paths))
     strip, span = strip_of(flown, track, until)
     texts = {"none": 0}
     firing = []
@@ -246,6 +258,11 @@ def _panels(
     )
 
 
+def _path(columns: list[list[int]]) -> str:
+    """A closed line as data of an SVG path."""
+    return "M" + "L".join(f"{x} {y}" for x, y in zip(*columns, strict=True)) + "Z"
+
+
 def _numbered(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
     """Columns by a common name and their number, from 1."""
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
@@ -365,7 +382,10 @@ def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale
 def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
     """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
     spacecraft = flown.spacecraft
-    angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
+    cones = np.degrees(np.concatenate([track.body_cone, track.space_cone]))
+    theta = np.degrees(track.nutation)
+    apart = float(np.abs(cones).max()) > APART * max(float(theta.max()), geometry.LEAST)
+    angles = np.concatenate([theta, [0.0]] if apart else [theta, cones, [0.0]])
     low, high = float(angles.min()), float(angles.max())
     margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
     low = low - margin
@@ -396,6 +416,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         ),
         zero=rise(0.0),
         required=rise(level) if low < level < high else None,
+        cones=not apart,
         outside="" if required is None or low < level < high else limit_text(math.radians(level)),
         channels=channels,
         bars=tuple(

@@ -62,7 +62,7 @@ from nutdamp.views import verdict as verdicts
 from nutdamp.views.check import check_screen
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Topic
-from nutdamp.views.parts import NOTES, pulse_table
+from nutdamp.views.parts import NOTES, block_table, pulse_table
 from nutdamp.views.simulation import (
     BUDGET_NOTE,
     budget_table,
@@ -156,8 +156,10 @@ def _templates() -> Environment:
     return environment
 
 
-WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
-"""Text in which no line may break: an option of a command, a relation with its number and unit."""
+WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?|\d{4}-\d\d-\d\d[\dT:.Z]*)")
+"""Text in which no line may break: an option of a command, a relation with its number and unit, a
+date.
+"""
 
 
 def _whole(text: str) -> Markup:
@@ -269,20 +271,14 @@ def report_page(
     remarks = glance.notes(compared)
     notes = [text(note) for note in remarks if severity(note) != WARNING]
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
-    contenders = []
-    for plan in compared.plans:
-        word = verdicts.scheme_word(compared, plan)
-        texts = (verdicts.spent(plan.pulses), word) if plan.feasible else (word,)
-        contenders.append(document.Contender(plan.scheme, texts, plan is chosen))
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
-            title=control.title or _title(spacecraft),
+            title=_titled(control.title, spacecraft),
             control=control,
             source=f"input {repeat.digest[:8]}" if repeat.digest else "",
             state=judged.light.value,
             headline=(lead, about),
             notes=tuple(notes[:NOTES]),
-            contenders=tuple(contenders),
             made_by=f"nutdamp {__version__}",
             verdict="" if chosen is None else verdicts.statement(judged),
             warnings=tuple(warnings),
@@ -295,12 +291,20 @@ def report_page(
                 page,
                 broken=tuple(broken),
                 state=Light.AMBER.value if broken and judged.light is Light.GREEN else page.state,
-                margins=tuple(_bar(judged, line) for line in judged.lines),
+                bounds=document.sheet(verdicts.bound_table(judged)),
+                bars=tuple(_bar(line) for line in judged.lines),
+                pulses=_fired(chosen),
+                count=len(chosen.pulses.blocks) or len(chosen.pulses),
                 facts=document.facts_of("Final state, after the last pulse", glance.ends(chosen)),
+                acceptance=acceptance_picture(compared),
                 warnings=(*warnings, *broken),
                 motion=(
-                    moving_of(chosen, repeat.craft(built_in=compared.spacecraft.built_in)),
-                    document.Beside(flight_pictures(chosen, judged), still=True),
+                    moving_of(
+                        chosen,
+                        repeat.craft(built_in=spacecraft.built_in),
+                        studies.accepted(chosen.flight, judged),
+                    ),
+                    document.Beside((flight_picture(chosen, judged),), still=True),
                 ),
             )
         task.reach(1.0)
@@ -308,31 +312,25 @@ def report_page(
         return replace(page, sections=tuple(sections))
 
 
-def _bar(judged: Verdict, line: Line) -> document.Bar:
-    """A required bound with its bar."""
-    bound, dispersed = line.bound, line.dispersed
-    level = (
-        ""
-        if judged.cases is None
-        else f"{verdicts.exact_percent(judged.cases.probability)} within "
-    )
-    alone = (
-        ""
-        if line.share is None or judged.cases is None
-        else f"{verdicts.percent(line.share, judged.cases.probability)} keep it"
-    )
-    texts = (
-        f"nominal {verdicts.value(bound, line.nominal)}",
-        "" if dispersed is None else level + verdicts.value(bound, dispersed),
-        f"limit {verdicts.limit(bound)}",
-        f"margin {verdicts.margin(line)}",
-        alone,
-        verdicts.line_word(line),
-    )
-    used = tuple(
-        math.nan if size is None else float(bound.used(size)) for size in (line.nominal, dispersed)
-    )
-    return document.Bar(bound.label, texts, used, line.met)
+def _bar(line: Line) -> document.Bar:
+    """Bar of a bound."""
+    dispersed = math.nan if line.dispersed is None else float(line.bound.used(line.dispersed))
+    nominal = float(line.bound.used(line.nominal))
+    return document.Bar(nominal, dispersed, line.met, line.bound.inner)
+
+
+SHOWN = 8  # pulses on the first screen; of more the first and the last
+
+
+def _fired(chosen: Plan) -> document.Sheet:
+    """Pulses of the first screen, or command blocks."""
+    limit = glance.limits(chosen.spacecraft)[0]
+    blocks = bool(chosen.pulses.blocks)
+    table = block_table(chosen.flight) if blocks else pulse_table(chosen.flight, limit=limit)
+    shown = document.sheet(table, "screen")._replace(title="Blocks" if blocks else "Pulses")
+    if len(shown.rows) <= SHOWN:
+        return shown
+    return shown._replace(rows=(shown.rows[0], shown.rows[-1]))
 
 
 def _sections(
@@ -346,9 +344,9 @@ def _sections(
     """Sections below the first screen."""
     chosen = compared.recommended
     dispersed = _cases_of(compared)
+    yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
     if dispersed is not None:
         yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
-    yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
     if traded:
         yield PageSection("trade", "Time against cost", tuple(_trade(compared, traded)))
     if chosen is not None:
@@ -375,7 +373,10 @@ def _cases_of(compared: Comparison) -> Dispersion | None:
     return dispersion
 
 
-def _title(spacecraft: Spacecraft) -> str:
+def _titled(title: str, spacecraft: Spacecraft) -> str:
+    """Title of the page, which names the spacecraft whatever ``title`` is given."""
+    if title:
+        return title if spacecraft.name in title else f"{spacecraft.name} · {title}"
     aims = []
     if spacecraft.tilt > NO_NUTATION:
         aims.append(f"damp {math.degrees(spacecraft.tilt):.4g}° nutation")
@@ -389,9 +390,7 @@ def _title(spacecraft: Spacecraft) -> str:
 
 
 def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
-    """Verdict, distributions and percentiles of the cases;
-    budget and worst cases behind a title.
-    """
+    """Verdict, and the final H of the cases; percentiles, budget and worst cases behind a title."""
     from nutdamp.views.dispersion import cone_lines, dispersion_screen, verdict_lines
 
     judged, results = dispersed.verdict, dispersed.core
@@ -401,8 +400,7 @@ def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     lines += [Prose(f"Note: {note}.")] if note else []
     required = document.sheet(verdicts.bound_table(judged))
     yield from lines
-    yield required
-    yield document.Beside(dispersion_pictures(dispersed))
+    yield dispersion_picture(dispersed)
     rest = [
         block
         for block in document.blocks_of(
@@ -512,26 +510,19 @@ def _versions() -> Iterator[tuple[str, str]]:
 
 
 PICTURES = {
-    "motion": (
-        "Pole curve: the tip of the rotation vector ω in the body. Axis track: "
-        "the spin axis in space, "
-        "with the places of the angular momentum H.",
-        "Pole curve in the body and track of the spin axis in space, with numbered pulses",
+    "course": (
+        "Axis track: the spin axis in space, with the places of the angular momentum H. Below: "
+        "nutation on a log axis with what is required, and the firings of each channel.",
+        "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
     ),
-    "history": (
-        (
-            "Nutation on a log axis with what is required, the firings of each channel, "
-            "and body rates over time."
-        ),
-        "Nutation, firings and body rates over time",
+    "acceptance": (
+        "A scheme whose contour lies in the grey box keeps both limits in enough cases; a dashed "
+        "one does not comply. Schemes far outside are arrows at the edge.",
+        "Acceptance box: nutation left against the tightest other limit, one contour a scheme",
     ),
     "trade": (
         "Each mark is a schedule for one of the end times tried, numbered along each front.",
         "Cost of schedules over the end of the last pulse",
-    ),
-    "cases": (
-        "How many cases leave how much nutation, and how far H has moved.",
-        "Distribution of nutation and of the end of H",
     ),
     "momentum": (
         "Where H ends in each case, with the ellipse that holds as many cases as must comply.",
@@ -541,16 +532,29 @@ PICTURES = {
 """Captions and descriptions of the pictures."""
 
 
-def flight_pictures(plan: Plan, judged: Verdict) -> tuple[Picture, ...]:
-    """Motion and history of a plan, from its flight through the real widths;
-    raises MissingExtra.
+FIRST = ("course", "acceptance")  # pictures of the first screen
+
+
+def flight_picture(plan: Plan, judged: Verdict) -> Picture:
+    """Axis track and history of a plan, from its flight through the real widths; raises
+    MissingExtra.
     """
     flown, track = overview.shown(plan)
-    motion = overview.flight_figure("motion", flown, track, judged)
-    history = (
-        overview.history_figure(flown, track, judged, narrow=narrow) for narrow in (False, True)
+    outlines = studies.accepted(flown, judged)
+    figures = (
+        overview.course_figure(flown, track, judged, outlines, narrow=narrow)
+        for narrow in (False, True)
     )
-    return _picture("motion", motion), _picture("history", *history)
+    return _picture("course", *figures)
+
+
+def acceptance_picture(compared: Comparison) -> Picture:
+    """Schemes beside the limits; raises MissingExtra."""
+    figures = (
+        studies.acceptance_figure(compared.verdict, compared.others, narrow=narrow)
+        for narrow in (False, True)
+    )
+    return _picture("acceptance", *figures)
 
 
 def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
@@ -562,16 +566,17 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     return _picture("trade", *figures)
 
 
-def dispersion_pictures(dispersed: Dispersion) -> tuple[Picture, ...]:
-    """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
-    return tuple(
-        _picture(name, studies.dispersion_figure(dispersed, name)) for name in ("cases", "momentum")
-    )
+def dispersion_picture(dispersed: Dispersion) -> Picture:
+    """Final directions of H in the cases of a study; raises MissingExtra."""
+    return _picture("momentum", studies.dispersion_figure(dispersed, "momentum"))
 
 
 def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
-    """A picture with its title as text of the page, and the ``narrow`` drawing for a phone."""
+    """A picture with its title as text of the page, and the ``narrow`` drawing for a phone; those
+    of the first screen stand beside its headline and have no other.
+    """
     title = str(figure.get_label()) or figure.get_suptitle()
+    title = "" if name in FIRST else title
     phone = "" if narrow is None else image.svg(narrow, titled=False)
     return Picture(image.svg(figure, titled=False), title, *PICTURES[name], phone)
 

@@ -16,6 +16,7 @@ from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.planning.simulation import Simulation
+from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import comparison_json
 from nutdamp.views.glance import scheme_table
@@ -134,15 +135,23 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     """Figure by its name of a flight, of that of a plan or of the recommended one; raises
     BadRequest, Infeasible.
     """
-    from nutdamp.figures import overview
+    from nutdamp.figures import overview, studies
 
     judged = None if isinstance(result, Flight) else result.verdict
+    others: tuple[Verdict, ...] = ()
     if isinstance(result, Comparison):
         if result.recommended is None:
             raise Infeasible(result.reason)
+        others = result.others
         result = result.recommended
+    box = None
     if isinstance(result, Plan):
-        flight, track = overview.shown(feasible(result))
+        assert judged is not None
+        feasible(result)
+        if name == "acceptance":
+            return studies.acceptance_figure(judged, others)
+        box = partial(studies.acceptance, judged=judged, others=others)
+        flight, track = overview.shown(result)
     elif isinstance(result, Flight):
         flight = result
         track = result.sampled(result.samples, overview.until(result))
@@ -150,10 +159,11 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
         flight, track = result.shown, result.pictured
     named = units.instance("name", name, str, "the name of a figure")
     try:
-        return overview.flight_figure(named, flight, track, judged)
+        return overview.flight_figure(named, flight, track, judged, box)
     except KeyError:
+        names = [*overview.DRAWN] if box is None else [*overview.DRAWN, "acceptance"]
         raise BadRequest(
-            f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}"
+            f"there is no figure {name!r}; expected one of {', '.join(names)}"
         ) from None
 
 

@@ -68,6 +68,7 @@ for (const view of document.querySelectorAll(".moving")) {
   const CROSS = "M-55 0H55M0 -55V55";
   const DIAMOND = "M0 -55L45 0L0 55L-45 0Z";
   const SMALL = "M0 -26L21 0L0 26L-21 0Z"; // on the globe, where a circle of few degrees is around it
+  const DISC = "M-42 0a42 42 0 1 0 84 0a42 42 0 1 0 -84 0M-8 0h16"; // the Sun and other watched directions
   const place = (mark, x, y) => mark.setAttribute("transform", `translate(${x} ${y})`);
 
   const pole = part("pole-curves"), sky = part("sky-curves");
@@ -106,6 +107,9 @@ for (const view of document.querySelectorAll(".moving")) {
       const [xs, ys] = rows.t[1] === rows.t[0] ? [[0, ...across], [rises[0], ...rises]] : [across, rises];
       path.setAttribute("d", line(xs.map((x) => x.toFixed(1)), ys.map((y) => y.toFixed(1))));
     }
+    const end = part("end").style;
+    const level = (high - rows.theta[last] / 10 ** data.digits.cone) / (high - low);
+    [end.left, end.top] = ["100%", `calc(8.5rem * ${level.toFixed(4)})`];
   };
 
   // ---- rolling cones: seen along H, angles true to scale
@@ -311,7 +315,7 @@ for (const view of document.querySelectorAll(".moving")) {
     const signs = data.named.map((one) => ({
       name: one.name,
       axis: one.axis,
-      mark: make(globe, "path", { class: one.kind, d: one.circles.length ? SMALL : DIAMOND }),
+      mark: make(globe, "path", { class: one.kind, d: one.kind === "watched" ? DISC : one.circles.length ? SMALL : DIAMOND }),
       text: make(globe, "text", {}),
     }));
     const places = [[0, 90, "+z"], [0, -90, "−z"], ...count(4, 90).map((lon) => [lon, 0, `${lon}°`])];

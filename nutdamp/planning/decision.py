@@ -355,6 +355,15 @@ class Comparison(results.Data, results.Tabled):
         """Judgement of each plan, by its dispersed cases where they were flown."""
         return {plan: self._judged(plan) for plan in self.plans}
 
+    @property
+    def others(self) -> tuple[Verdict, ...]:
+        """Judgements of the feasible plans that are not recommended."""
+        return tuple(
+            verdict
+            for plan, verdict in self.verdicts.items()
+            if plan.feasible and plan is not self.recommended
+        )
+
     def _judged(self, plan: Plan) -> Verdict:
         flown = (self.flown or {}).get(plan)
         cases, cored = (None, None) if flown is None else (flown.cases, flown.results)

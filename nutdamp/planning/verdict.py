@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -122,6 +123,9 @@ class JudgedCases(Protocol):
     def level(self, bound: Bound) -> float | None:
         """Value that the required share of cases keeps."""
 
+    def spread(self, bound: Bound) -> Any:
+        """Distribution of the value of a bound's part."""
+
     def contributions(self, bound: Bound) -> dict[str, float]:
         """Share of the variance by input."""
 
@@ -168,6 +172,12 @@ class Line(NamedTuple):
     def margin(self) -> float:
         """Distance of that value to the bound."""
         return float(self.bound.margin(self.value))
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """Share of the cases that keep the bound, then its free fraction: the least is tightest."""
+        free = 1.0 - float(self.bound.used(self.value))
+        return 1.0 if self.share is None else self.share, free
 
 
 class Cause(NamedTuple):
@@ -263,13 +273,7 @@ class Verdict:
         """Line of the required bound that the fewest cases keep, or that is kept most narrowly;
         None without any.
         """
-
-        def room(line: Line) -> tuple[float, float]:
-            return 1.0 if line.share is None else line.share, 1.0 - float(
-                line.bound.used(line.value)
-            )
-
-        return min(self.required, key=room, default=None)
+        return min(self.required, key=attrgetter("room"), default=None)
 
     @property
     def empties(self) -> bool:

@@ -12,7 +12,7 @@ one layout: cost in kg (null: none), pulses as channel, start, on-time.
 milliarcseconds: days since J2000.0 (TT) and the geocentric direction of the Sun in the celestial
 reference frame, with aberration.
 
-``picture``, two-pulse.png, the picture in the README: the built-in example with two-pulse. But for
+``picture``, acceptance.png, the picture in the README: the schemes of the built-in example. But for
 this one nothing of nutdamp's planning takes part.
 """
 
@@ -112,9 +112,9 @@ def sun() -> None:
 
 
 def picture() -> None:
-    """Draw the motion of the built-in example, in a folder where no spacecraft.yaml is."""
-    command = (sys.executable, "-m", "nutdamp", "simulate", "--scheme", "two-pulse", "--flown")
-    drawing = ("--plot", str(FOLDER / "two-pulse.png"), "--figure", "motion")
+    """Draw the acceptance box of the built-in example, in a folder where no spacecraft.yaml is."""
+    command = (sys.executable, "-m", "nutdamp", "plan")
+    drawing = ("--plot", str(FOLDER / "acceptance.png"), "--figure", "acceptance")
     with TemporaryDirectory() as empty:
         subprocess.run([*command, *drawing], cwd=empty, check=True)
 

@@ -167,7 +167,7 @@ def test_a_torque_along_the_spin_axis_has_no_arrow(
 
 def test_bars_stand_where_the_thrusters_are_on_and_are_all_numbered() -> None:
     made, _ = flown("blackouts")
-    axes = drawn("history", "blackouts").axes[1]
+    axes = drawn("course", "blackouts").axes[2]
     rows = dict(
         zip([label.get_text() for label in axes.get_yticklabels()], axes.get_yticks(), strict=True)
     )
@@ -194,7 +194,7 @@ def test_of_many_firings_those_that_can_be_read_are_numbered() -> None:
     assert numbered(drawn("motion", "celestial").axes[0])[:1] == [2]
     assert (
         len(flown("34 pulses")[0].schedule)
-        == len(drawn("history", "34 pulses").axes[1].collections)
+        == len(drawn("course", "34 pulses").axes[2].collections)
         == 34
     )
     assert all(1 <= len(numbered(axes)) <= 16 for axes in drawn("motion", "34 pulses").axes[:2])
@@ -203,7 +203,7 @@ def test_of_many_firings_those_that_can_be_read_are_numbered() -> None:
 @pytest.mark.deep
 def test_histories_hold_the_track() -> None:
     _, track = flown("three moments")
-    decay, _, rates, spin = drawn("history", "three moments").axes
+    decay, _, rates, spin = drawn("overview", "three moments").axes[-4:]
     values = np.degrees(track.rates)
     for axes, name, row in ((rates, "ω1", 0), (rates, "ω2", 1), (spin, "_ω3", 2)):
         assert points(axes, name) == pytest.approx(np.column_stack([track.t, values[:, row]]))
@@ -219,7 +219,7 @@ def test_histories_hold_the_track() -> None:
 )
 def test_no_panel_is_empty(case: str, panels: int) -> None:
     """Rows of firings where there are some, the spin where it changes."""
-    assert len(drawn("history", case).axes) == panels
+    assert len(drawn("course", case).axes) == panels
 
 
 @pytest.mark.deep
@@ -227,7 +227,7 @@ def test_the_log_axis_reaches_the_requirement_and_what_is_left() -> None:
     """Whichever is less, four decades down at most; the last value is written above the panel."""
     for degrees, bound in ((5.0, 0.01), (5.0, 1e-6), (5.0, None), (0.0, 0.01), (5.0, 0.12)):
         body = spinner(degrees=degrees, requirement=Requirement(bound) if bound else None)
-        axes = flight_picture("history", body, Schedule()).axes[0]
+        axes = flight_picture("course", body, Schedule()).axes[1]
         low, high = axes.get_ylim()
         assert high >= 10.0 * low
         levels = [
@@ -258,7 +258,7 @@ def test_the_title_has_the_verdict_in_its_colour(
     verdict = planning.judge(
         plan, None if share is None else Cases(100, 1, 0.9, share, share, share)
     )
-    figure = overview.history_figure(*overview.shown(plan), verdict)
+    figure = overview.course_figure(*overview.shown(plan), verdict)
     assert to_hex(present(figure._suptitle).get_color()) == colour  # type: ignore[attr-defined]
     assert heading(figure).endswith(statement(verdict))
 
@@ -290,7 +290,7 @@ def test_time_axes_end_soon_after_the_last_pulse(case: str) -> None:
 
 @pytest.mark.deep
 def test_the_axes_of_time_reach_as_far_as_is_drawn() -> None:
-    for name in ("overview", "history"):
+    for name in ("overview", "course"):
         timed = [
             axes
             for axes in drawn(name, "wide pulses").axes
@@ -325,14 +325,14 @@ def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
 def test_of_a_very_long_time_all_pictures_say_how_much_is_drawn() -> None:
     made = propagation.flown(WIDE, Schedule(), 1e6)
     track = made.sampled(1000, 1e6)
-    figure = overview.history_figure(made, track)
+    figure = overview.course_figure(made, track)
     axes = figure.axes[-1]
     until = present(re.search(r"the first ([\d.]+) s of 1e\+06 s", heading(figure)))
     assert float(until[1]) == pytest.approx(axes.get_xlim()[1], rel=1e-3)
     assert heading(overview.flight_figure("motion", made, track)).endswith(
         f"drawn: the first {until[1]} s of 1e+06 s"
     )
-    assert "drawn" not in heading(drawn("history", "wide pulses"))
+    assert "drawn" not in heading(drawn("course", "wide pulses"))
 
 
 def test_titles_name_scheme_model_and_result_in_lines_that_fit() -> None:
@@ -496,9 +496,9 @@ def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(
 @pytest.mark.parametrize(
     ("name", "case"),
     [
-        *(("history", "blackouts"), deep("history", "120 pulses"), deep("overview", "blackouts")),
+        *(("course", "blackouts"), deep("course", "120 pulses"), deep("overview", "blackouts")),
         *(weekly("overview", case) for case in ("16 channels", "steered", "one pulse", "reversed")),
-        *(weekly("history", case) for case in ("16 channels", "steered", "one pulse", "reversed")),
+        *(weekly("course", case) for case in ("16 channels", "steered", "one pulse", "reversed")),
         weekly("overview", "120 pulses"),
     ],
 )
@@ -539,7 +539,7 @@ def test_labels_of_firings_have_room(name: str, case: str) -> None:
 
 def test_steering_angles_are_those_of_the_table_and_say_from_where() -> None:
     pulses = flown("steered")[0].schedule.pulses[::2]
-    axes = flight_picture("history", STEERED, Schedule(pulses)).axes[1]
+    axes = flight_picture("course", STEERED, Schedule(pulses)).axes[2]
     assert "from body axis +1" in axes.get_title("right")
     angles = [
         float(said[1])
@@ -638,7 +638,7 @@ def test_firings_that_cannot_be_told_apart_are_drawn_as_one() -> None:
     assert (every[0].begins, every[0].ends) == pytest.approx(
         (made.schedule.pulses[0].start, made.schedule.end)
     )
-    patches = drawn("history", "120 pulses").axes[2].patches
+    patches = drawn("overview", "120 pulses").axes[-1].patches
     assert (
         len([patch for patch in patches if to_hex(patch.get_facecolor()) == style.PULSE.lower()])
         == 1
@@ -688,7 +688,7 @@ def test_where_h_moves_little_it_is_shown_enlarged() -> None:
 @pytest.mark.parametrize(
     ("name", "case"),
     [
-        ("history", "blackouts"),
+        ("course", "blackouts"),
         *(deep("overview", case) for case in ("three moments", "far target", "long name")),
         *(deep(name, "34 pulses") for name in NAMES[1:]),
         *(weekly(name, case) for case in CASES for name in NAMES),
@@ -713,7 +713,7 @@ def test_no_text_is_cut_in_the_pictures_of_the_configs(path: Path) -> None:
 
 
 @pytest.mark.parametrize("case", [weekly("reversed"), "far target", weekly("120 pulses")])
-@pytest.mark.parametrize("name", [*map(deep, NAMES[:2]), "history"])
+@pytest.mark.parametrize("name", [*map(deep, NAMES[:2]), "course"])
 def test_words_and_swatches_can_be_seen_on_white_and_in_the_dark(name: str, case: str) -> None:
     check_colours(drawn(name, case))
     assert all(contrast(style.GREY, paper) > 3.0 for paper, _ in pages())

@@ -51,7 +51,7 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(
     path: str, magic: bytes
 ) -> None:
-    figure = drawn("history", "no pulses")
+    figure = drawn("course", "no pulses")
     content = image.rendered(figure, path)
     assert content.startswith(magic)
     assert image.rendered(figure, path) == content
@@ -60,7 +60,7 @@ def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(
 def test_other_endings_and_missing_programs_are_named_with_the_cure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    figure = drawn("history", "no pulses")
+    figure = drawn("course", "no pulses")
     said = [
         *(
             refusal(BadRequest, image.ending, path)
@@ -86,11 +86,11 @@ def test_other_endings_and_missing_programs_are_named_with_the_cure(
 
 
 def test_settings_of_the_user_change_nothing() -> None:
-    plain = image.rendered(drawn("history", "no pulses"), "a.png")
+    plain = image.rendered(drawn("course", "no pulses"), "a.png")
     with mpl.rc_context(
         {"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}
     ):
-        assert image.rendered(drawn("history", "no pulses"), "a.png") == plain
+        assert image.rendered(drawn("course", "no pulses"), "a.png") == plain
         assert mpl.rcParams["font.size"] == 20
 
 
@@ -102,7 +102,7 @@ def test_inline_svg_stands_in_any_page() -> None:
     """As wide as what holds it, in the colour of the text around, and no rule or id of it meets
     another's.
     """
-    shown = [image.svg(drawn("history", case)) for case in ("wide pulses", "no pulses")]
+    shown = [image.svg(drawn("course", case)) for case in ("wide pulses", "no pulses")]
     ids = []
     for text in shown:
         root = ET.fromstring(text)
@@ -115,7 +115,7 @@ def test_inline_svg_stands_in_any_page() -> None:
         assert len(ids[-1]) == len(set(ids[-1]))
         assert set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text)) <= set(ids[-1])
     assert not set(ids[0]) & set(ids[1])
-    for content in (shown[0], image.rendered(drawn("history", "wide pulses"), "a.svg").decode()):
+    for content in (shown[0], image.rendered(drawn("course", "wide pulses"), "a.svg").decode()):
         words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
         assert "θ, ° (log)" in words
         assert any(word.startswith("1: ") for word in words)

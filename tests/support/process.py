@@ -177,13 +177,17 @@ def _plain(value: Any) -> Any:
 @contextmanager
 def unpictured() -> Iterator[None]:
     """Pages are made without pictures."""
-    one, several = (lambda *_: Prose("")), (lambda *_: ())
+
+    def one(*_: object) -> Prose:
+        return Prose("")
+
     with patch.multiple(
         report,
         moving_of=one,
-        flight_pictures=several,
+        flight_picture=one,
+        acceptance_picture=one,
         trade_picture=one,
-        dispersion_pictures=several,
+        dispersion_picture=one,
     ):
         yield
 

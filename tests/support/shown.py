@@ -119,7 +119,7 @@ def kicks(body: Spacecraft, count: int, step: float, on_time: float) -> Schedule
     )
 
 
-NAMES = ("overview", "motion", "history")  # the last one is the picture of the report
+NAMES = ("overview", "motion", "course")  # the last one is the picture of the report
 TORQUER = Steerable(50.0)
 STEERED = spinner(steerable=TORQUER, requirement=Requirement(0.01))
 SIXTEEN = spinner(degrees=8.0, channels=fan(16, 20.0))
@@ -198,8 +198,8 @@ def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pu
 
 def figure_of(name: str, flight: Flight, track: Track) -> Figure:
     """One of `NAMES`."""
-    if name == "history":
-        return overview.history_figure(flight, track)
+    if name == "course":
+        return overview.course_figure(flight, track)
     return overview.flight_figure(name, flight, track)
 
 

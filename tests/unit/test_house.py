@@ -223,6 +223,7 @@ COMPARE = {
     "planning/decision.py": "severities of plans with each other",
     "schemes/optimal/search.py": "leads of a search that come near enough to be refined",
     "page/moving.py": "what lies within the scale of a drawing",
+    "figures/studies.py": "what lies within the scale of a drawing",
     WORDS: "digits that keep a number on its side of the limit",
 }
 """Modules that compare with the limit of a bound, but judge nothing by it."""

@@ -253,7 +253,7 @@ def test_dragging_a_bar_moves_the_firing_and_its_edge_the_on_time(
 ) -> None:
     plan = chosen(FILES[name])
     with browse(written(FILES[name])) as page:
-        page.locator(".desk").scroll_into_view_if_needed()
+        page.locator(".strip").scroll_into_view_if_needed()
         box = part(page, "strip").bounding_box()
         data = json.loads(page.locator(".moving script").text_content())
         second = (1.0 - data["lead"]) * box["width"] / data["until"]  # px
@@ -481,11 +481,9 @@ def test_the_cones_roll_on_each_other(browse: Browse, written: Any) -> None:
 @pytest.mark.parametrize("name", ["example", "target"])
 def test_it_fits_one_screen_and_a_phone(browse: Browse, written: Any, name: str) -> None:
     with browse(written(FILES[name]), 1280) as page:
-        top, bottom = page.evaluate(
-            "[document.querySelector('.moving').getBoundingClientRect().top, "
-            "document.querySelector('.desk').getBoundingClientRect().bottom]"
-        )
-        assert bottom - top <= 800.0
+        first = "document.querySelector('{}').getBoundingClientRect().bottom"
+        assert page.evaluate(first.format("#decision")) <= 800.0
+        assert page.evaluate(first.format(".controls")) <= 840.0
     with browse(written(FILES[name]), 400) as page:
         wide = (
             "[...document.querySelectorAll('.bench, .bench *')]"
