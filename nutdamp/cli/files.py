@@ -36,6 +36,7 @@ from nutdamp.cli.main import (
 from nutdamp.cli.options import (
     END,
     FILE,
+    OF_RECORD,
     OUTPUT,
     Count,
     Grouped,
@@ -327,7 +328,11 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 )
 @click.option("--into", type=FILE, help="Spacecraft file into which the message is merged.")
 @click.option("--inertia", is_flag=True, help="Merge moments of inertia and mass too.")
-@click.option("--at", type=END, help="Record of a history, after its first; default the first.")
+@click.option(
+    "--at",
+    type=OF_RECORD,
+    help="Take the next record of a history after so long, such as 12.5s; default 0s, the first.",
+)
 @click.option(
     "--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`."
 )
@@ -371,13 +376,12 @@ def import_command(
         text, body, pulses = imported(contents, file)
         sheet = (schedule, lambda: pulse_table(flown(body, pulses)).csv())
         deliver([(output, lambda: text), sheet])
-        remarks, doubts = contents.remarks, contradictions(contents, body, "the latter nutation")
+        remarks, doubts = contents.remarks, contradictions(contents, body, "this one")
         if pulses.pulses and schedule is None:
             remarks += (f"{len(pulses)} manoeuvres; --schedule FILE writes them",)
     for entry in remarks:
         job.remark(f"{file}: {entry}")
-    for entry in doubts:
-        say(f"{file}: warning: {entry}")
+    job.note(doubts)
 
 
 POINTS = 6  # horizons tried for each front where no number follows ``--trade``

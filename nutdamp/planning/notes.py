@@ -21,6 +21,7 @@ from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import WASTEFUL, worths
+from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 
@@ -44,6 +45,9 @@ def spacecraft_notes(spacecraft: Spacecraft) -> Iterator[Note]:
     if not damped.met(tilt):
         limit = math.degrees(damped.limit)
         yield note("principal-axis-off", tilt_deg=math.degrees(tilt), limit_deg=limit)
+    commands = spacecraft.commands
+    if commands is not None and commands.per_turn > 1 and commands.delay_is != ANGLE:
+        yield note("delays-in-time", per_turn=commands.per_turn)
     channels = [channel for channel in spacecraft.channels if channel.damps]
     pushes = np.array([channel.transverse / abs(channel.transverse) for channel in channels])
     if len(channels) > 1 and np.outer(pushes, pushes.conj()).real.min() >= math.cos(ALIKE):
