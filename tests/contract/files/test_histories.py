@@ -188,7 +188,7 @@ def test_faults_have_their_line_and_field(write: Write) -> None:
 def test_a_parameter_message_is_no_telemetry(write: Write) -> None:
     plan = messages.planned("prolate")
     path = write(export_text(plan, "apm"), "message.apm")
-    with pytest.raises(BadRequest, match="expected a history"):
+    with pytest.raises(BadRequest, match="no history of attitudes"):
         nutdamp.fit(path, plan.spacecraft, ignored=print)
     with pytest.raises(FaultyFile, match="convert to KVN"):
         nutdamp.fit(
