@@ -284,22 +284,19 @@ def spin_table(spacecraft: Spacecraft, schedule: Schedule, until: float) -> str:
     periods = np.diff(begins)
     if first == 0:  # the rest of a spin, which began before t = 0
         periods[0] = periods[1]
-    flown = propagation.flown(spacecraft, schedule, last)
-    turned = parts.phases(flown)
-    if not parts.sun_phased(spacecraft):
-        turned *= math.copysign(1.0, spacecraft.spin)
+    sense = 1.0 if parts.sun_phased(spacecraft) else math.copysign(1.0, spacecraft.spin)
+    turned = sense * parts.phases(propagation.flown(spacecraft, schedule, last))
     fired: dict[int, list[tuple[Pulse, float]]] = {}
     for pulse, angle in zip(schedule, np.degrees(turned).tolist(), strict=True):
         phase = round(angle % 360.0, DIGITS) % 360.0
         spin = min(int(np.searchsorted(ends, pulse.loaded[0], "right")), len(ends) - 1)
-        passed = 360.0 * (1.0 - (ends[spin] - pulse.loaded[0]) / periods[spin])
         # A pulse at the very end of a spin, with a phase rounded to 0, is in the next one.
-        spin += round((passed - phase) / 360.0)
-        fired.setdefault(spin, []).append((pulse, phase))
-    count = max([int(np.searchsorted(begins, last, "right")) - 1, *fired]) + 1
+        passed = 1.0 - (ends[spin] - pulse.loaded[0]) / periods[spin]
+        fired.setdefault(spin + round(passed - phase / 360.0), []).append((pulse, phase))
+    latest = max(int(np.searchsorted(begins, last, "right")) - 1, *fired, 0)
     rows = [
         SpinRow(first + index, spacecraft.utc(begin), begin, periods[index], fired.get(index, []))
-        for index, begin in enumerate(begins[: min(count, len(ends))].tolist())
+        for index, begin in enumerate(begins[:-1][: latest + 1].tolist())
     ]
     return DataTable("Spins", SPINS, rows).csv()
 

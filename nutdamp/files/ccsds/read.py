@@ -115,8 +115,12 @@ class Contents(NamedTuple):
             remarks += ("the message lacks rates; they follow from its attitudes near the record",)
         elif not unknown[2]:
             rates = np.nan_to_num(rates)
+        epoch = self.epoch.plus(float(self.times[index]))
+        if len(self.times) > 1:
+            late = f"{self.times[index] - self.times[0]:.6g} s after the first"
+            remarks = (f"record used: {late}, at {epoch.text}Z", *remarks)
         return self._replace(
-            epoch=self.epoch.plus(float(self.times[index])),
+            epoch=epoch,
             times=np.zeros(1),
             quaternions=self.quaternions[[index]],
             rates=rates[None],

@@ -302,11 +302,10 @@ def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
 
 ORIGINATOR = "NUTDAMP"
 
-PRODUCTS = (
+PRODUCTS = (  # comment on the signs of INERTIA
     "IXY, IXZ, IYZ are products of inertia such as the sum of m*x*y, as CCSDS 504.0-B-2 has them: "
     "minus the entries of the tensor off its diagonal."
 )
-"""Comment on the signs of INERTIA."""
 
 
 def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
@@ -334,8 +333,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         blocks.append(_block("SPIN", [*frames, *values], euler_rate(spin, rates[2])))
     # The products are minus the entries off the diagonal (annex F6).
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = spacecraft.inertia.tensor.tolist()
-    inertia = [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz]
-    blocks.append(_block("INERTIA", inertia, PRODUCTS))
+    blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz], PRODUCTS))
     blocks += _manoeuvres("MAN", plan, reference)
     about = block("", message.APM_METADATA, [*_identity(spacecraft), None, "UTC"])
     return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
@@ -621,8 +619,14 @@ def contradictions(record: Contents, spacecraft: Spacecraft, remains: str) -> li
     stated, follows = acute(record), spacecraft.widest.nutation
     if math.isnan(stated) or abs(follows - stated) <= ROUNDED + SAME_NUTATION * stated:
         return []
-    angles = {"stated_deg": math.degrees(stated), "follows_deg": math.degrees(follows)}
-    return [note("message-contradicts", remains=remains, **angles)]
+    return [
+        note(
+            "message-contradicts",
+            stated_deg=math.degrees(stated),
+            follows_deg=math.degrees(follows),
+            remains=remains,
+        )
+    ]
 
 
 def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list[str]:
@@ -681,10 +685,6 @@ def merge(
         record = contents.at(time, before.spin)
         turn = record.quaternions[0]
         rates = rates if np.isnan(record.rates).any() else record.rates[0]
-        if len(contents.times) > 1:
-            late = record.epoch.since(contents.epoch)
-            told = f"record used: {late:.6g} s after the first, at {record.epoch.text}Z"
-            record = record._replace(remarks=(told, *record.remarks))
     after = replace(after, omega0=axes.T @ rates)
     if record is not contents and acute(record) > 0.0:
         doubts = contradictions(record, after, "the spin and nutation of the message")

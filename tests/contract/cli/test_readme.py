@@ -305,7 +305,7 @@ def test_each_topic_fits_the_screen_and_loses_nothing(topic: str) -> None:
         assert max(map(len, shown.splitlines())) <= min(columns, explain.WIDEST)
         assert letters(shown) == whole
     if topic in guide.NAMES:
-        text = re.sub(r"```\w*", "", guide.page_or_topic(topic).text)
+        text = re.sub(r"```\w*|(?m:(?<=^\d)\.)", "", guide.page_or_topic(topic).text)
         lost = letters(text) - letters(explained(topic))
         assert set(lost) <= set("#`|*-\\>"), lost
 
