@@ -294,7 +294,8 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm
     also mass, and orbit for its state. Vectors are in the axes of that file, those of opm in
-    attitude.frame. A frame of the ecliptic or of date is turned into EME2000.
+    attitude.frame. A frame of the ecliptic or of date is turned into EME2000. IXY, IXZ and IYZ are
+    products of inertia as in CCSDS 504.0-B-2: minus the entries of inertia.tensor.
     """
     from nutdamp.api import export
     from nutdamp.views.verdict import stated
@@ -342,11 +343,12 @@ def import_command(
 ) -> None:
     """Make a spacecraft file from an attitude message, or merge one into a file.
 
-    Read are CCSDS messages of version 2 in KVN (APM, AEM, ACM) and attitude files of STK (.a). With
-    --into attitude, epoch and rates, of a history those of one record, replace those of a
-    spacecraft file; all else stays. Without it the message needs inertia and the motion: angular
-    velocity or spin. It knows no thrusters; where all its manoeuvres are transverse and of one
-    torque, the file gets a steerable torquer of that torque. FILE may be - for standard input.
+    It reads CCSDS messages of version 2 in KVN (APM, AEM, ACM) and attitude files of STK (.a). With
+    --into, attitude, epoch and rates replace those of a spacecraft file; all else stays. Of a
+    history one record is used, the one of --at. Without --into the message needs inertia and the
+    motion: angular velocity or spin. A message has no thrusters. If all its manoeuvres are
+    transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be -
+    for standard input.
     """
     *form, file = given
     if form not in ([], ["apm"]):

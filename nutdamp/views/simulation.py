@@ -369,9 +369,8 @@ def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
 SHOWN = 1e-9 * math.pi / 180.0  # rad; smaller differences are shown as rounding
 BUDGET = "Error budget: what each imperfection leaves, alone"  # the title of `budget_table`
 BUDGET_NOTE = (  # note on `budget_table`
-    "Plans are tuned to what is fired, so that the rows do not add up. "
-    "A row 'without' shows what the same pulses "
-    "leave without that effect, more or less."
+    "The rows do not add up, because a plan is tuned to all effects together. A "
+    "row 'without' shows what the same pulses leave without that effect."
 )
 
 
