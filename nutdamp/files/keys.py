@@ -215,11 +215,9 @@ class DispersionsSection(Section):
     """
 
     correlation: list[tuple[str, str, Correlation]] = Field(
-        (
-            "Pairs of inputs that vary together, named as in disperse --json, and their "
-            "correlation, -1 to 1. For uniform and triangular inputs it is that of underlying "
-            "normals (Gaussian copula)."
-        ),
+        "Pairs of inputs that vary together, named as in disperse --json, and their correlation, "
+        "-1 to 1. For uniform and triangular inputs it is that of underlying normals (Gaussian "
+        "copula).",
         [["A", "C", 0.99]],
         default=[],
     )
@@ -318,11 +316,9 @@ class LoopSensorSection(Section):
         "gyro",
     )
     axes: Literal["file", "principal"] = Field(
-        (
-            "Axes about which gyros measure. file (default): those of the file, where a tilted "
-            "principal axis shows as a rate. principal: those of gyros calibrated to the "
-            "principal axes."
-        ),
+        "Axes about which gyros measure. file (default): those of the file, where a tilted "
+        "principal axis shows as a rate. principal: those of gyros calibrated to the principal "
+        "axes.",
         "principal",
         default="file",
     )
@@ -380,11 +376,9 @@ class LoopSection(Section):
         "The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"}
     )
     law: Literal["four-pulse", "one-pulse", "bang"] = Field(
-        (
-            "four-pulse (default): each channel that comes into line fires as long as needed, at "
-            "most on_time. one-pulse: the same, at most half a nutation period. bang: each fires "
-            "for on_time."
-        ),
+        "four-pulse (default): each channel that comes into line fires as long as needed, at most "
+        "on_time. one-pulse: the same, at most half a nutation period. bang: each fires for "
+        "on_time.",
         "four-pulse",
         default="four-pulse",
     )
@@ -401,10 +395,8 @@ class LoopSection(Section):
         "Least time from one firing to the next, s; default 0.", "0.5 s", default=0.0
     )
     predict: bool = Field(
-        (
-            "true (default): firings are centred on their moments, with delay, filter and half "
-            "the on-time compensated."
-        ),
+        "true (default): firings are centred on their moments, with delay, filter and half the "
+        "on-time compensated.",
         True,
         default=True,
     )
@@ -414,10 +406,8 @@ class LoopSection(Section):
         default=False,
     )
     on_time: PositiveTime | None = Field(
-        (
-            "On-time of bang, and longest on-time of four-pulse, s. Default of four-pulse: an "
-            "eighth of the nutation period, within min_on_time and max_on_time."
-        ),
+        "On-time of bang, and longest on-time of four-pulse, s. Default of four-pulse: an eighth "
+        "of the nutation period, within min_on_time and max_on_time.",
         "50 ms",
     )
     faults: LoopFaultsSection | None = Field(
@@ -556,10 +546,8 @@ class WheelSection(Section):
     """A part that spins relative to the body: a momentum wheel, or a despun platform."""
 
     momentum: Annotated[float, Quantity("momentum")] = Field(
-        (
-            "Its constant angular momentum along principal axis 3, signed, N m s. It adds to the "
-            "C ω3 of the rest."
-        ),
+        "Its constant angular momentum along principal axis 3, signed, N m s. It adds to the C ω3 "
+        "of the rest.",
         "40 N m s",
     )
 
@@ -571,18 +559,13 @@ class SunSensorSection(Section):
         "Azimuth in the body at which the Sun pulse comes, rad, about axis 3 from axis 1.", "35 deg"
     )
     elevation: Declination = Field(
-        (
-            "Middle of its view, rad, from the plane square to axis 3 towards the spin axis; "
-            "default 0."
-        ),
+        "Middle of its view, rad, from the plane square to axis 3 towards the spin axis; default "
+        "0.",
         "45 deg",
         default=0.0,
     )
     half_width: Apart = Field(
-        (
-            "Largest angle from there at which it sees the Sun, rad. Default: 90 deg, which is "
-            "always."
-        ),
+        "Largest angle from there at which it sees the Sun, rad. Default: 90 deg, which is always.",
         "45 deg",
         default=RIGHT_ANGLE,
     )
@@ -621,18 +604,14 @@ class CommandsSection(Section):
         default=[1],
     )
     per_turn: Annotated[int, Within(1, 2)] = Field(
-        (
-            "Number of blocks that may fire in the same turns, without overlap; default 1. With "
-            "2, prefer delay_is: angle, which keeps opposite pulses apart while the spin changes."
-        ),
+        "Number of blocks that may fire in the same turns, without overlap; default 1. With 2, "
+        "prefer delay_is: angle, which keeps opposite pulses apart while the spin changes.",
         2,
         default=1,
     )
     delay_is: Literal["time", "angle"] = Field(
-        (
-            "How a delay counts. time (default): seconds after the Sun pulse. angle: turn of the "
-            "Sun since its pulse."
-        ),
+        "How a delay counts. time (default): seconds after the Sun pulse. angle: turn of the Sun "
+        "since its pulse.",
         "angle",
         default="time",
     )
@@ -678,11 +657,8 @@ class ValveSection(Section):
     )
     fall_time: Time = Field("From full thrust to none, s; default 0.", "10 ms", default=0.0)
     on_time_is: Literal["command", "effective"] = Field(
-        (
-            "Meaning of a commanded on-time. command (default): the length of the command. "
-            "effective: impulse over full thrust, which the valve electronics turns into a "
-            "command."
-        ),
+        "Meaning of a commanded on-time. command (default): the length of the command. effective: "
+        "impulse over full thrust, which the valve electronics turns into a command.",
         "command",
         default="command",
     )
@@ -709,18 +685,13 @@ class TankSection(Section):
         "Exponent n of thrust ~ pressure^n; default 1.", 1, default=1.0
     )
     isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
-        (
-            "Rows of pressure, Pa, rising, and specific impulse, s, in place of that of the "
-            "thrusters. Values between rows are interpolated. Below the first row its value "
-            "holds."
-        ),
+        "Rows of pressure, Pa, rising, and specific impulse, s, in place of that of the thrusters."
+        " Values between rows are interpolated. Below the first row its value holds.",
         [["8 bar", "215 s"], ["22 bar", "228 s"]],
     )
     inertia_per_kg: Annotated[list[Shed], Length(3, 3)] | ShedSection | None = Field(
-        (
-            "Decrease of the moments of inertia for each kg used, kg m²/kg. Give A and C, or the "
-            "three principal moments, the one about axis 3 last. Default: they stay."
-        ),
+        "Decrease of the moments of inertia for each kg used, kg m²/kg. Give A and C, or the three"
+        " principal moments, the one about axis 3 last. Default: they stay.",
         {"A": "0.4 kg m^2/kg", "C": "0.6 kg m^2/kg"},
     )
 
@@ -753,11 +724,9 @@ class InertiaSection(Section):
         "Moment of inertia about the spin axis 3, kg m²; at most 2 A.", "80 kg m^2"
     )
     tensor: Tensor | None = Field(
-        (
-            "Inertia tensor, 3 rows of 3, kg m². Entries off the diagonal are minus the products "
-            "of inertia: row 1, column 2 is -IXY, with IXY the sum of m x y as in CCSDS messages."
-            " Axis 3 is the principal axis nearest the file's third axis."
-        ),
+        "Inertia tensor, 3 rows of 3, kg m². Entries off the diagonal are minus the products of "
+        "inertia: row 1, column 2 is -IXY, with IXY the sum of m x y as in CCSDS messages. Axis 3 "
+        "is the principal axis nearest the file's third axis.",
         [[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]],
     )
 
@@ -789,31 +758,22 @@ class AttitudeSection(Section):
         "Rotation from body to frame, scalar first. It is normalised when read.", [1, 0, 0, 0]
     )
     spin_axis: InTheSky | None = Field(
-        (
-            "Right ascension and declination of the spin axis, rad, in place of quaternion. See "
-            "phase."
-        ),
+        "Right ascension and declination of the spin axis, rad, in place of quaternion. See phase.",
         ["120 deg", "-15 deg"],
     )
     phase: Angle | None = Field(
-        (
-            "Angle about spin_axis from its ascending node to body axis 1, rad; default 0. The "
-            "ascending node is z of the frame × spin axis; at a pole it is x of the frame."
-        ),
+        "Angle about spin_axis from its ascending node to body axis 1, rad; default 0. The "
+        "ascending node is z of the frame × spin axis; at a pole it is x of the frame.",
         "20 deg",
     )
     sun_phase: Angle | None = Field(
-        (
-            "Angle about spin_axis from the side of the Sun to body axis 1, rad, in place of "
-            "phase. It needs sun."
-        ),
+        "Angle about spin_axis from the side of the Sun to body axis 1, rad, in place of phase. It"
+        " needs sun.",
         "35 deg",
     )
     of: Literal["axis", "momentum"] | None = Field(
-        (
-            "The vector whose direction spin_axis and phase give: the spin axis itself (default),"
-            " or the angular momentum."
-        ),
+        "The vector whose direction spin_axis and phase give: the spin axis itself (default), or "
+        "the angular momentum.",
         "momentum",
     )
     epoch: DateAndTime | None = Field(
@@ -821,10 +781,8 @@ class AttitudeSection(Section):
         "2026-03-01T12:00:00Z",
     )
     frame: Literal["EME2000", "J2000", "GCRF", "ECLIPJ2000", "ECLIPDATE", "MOD"] | None = Field(
-        (
-            "Inertial frame of the attitude and of all directions of the file. In a frame of the "
-            "ecliptic, right ascension and declination are longitude and latitude."
-        ),
+        "Inertial frame of the attitude and of all directions of the file. In a frame of the "
+        "ecliptic, right ascension and declination are longitude and latitude.",
         "EME2000",
     )
 
@@ -850,7 +808,7 @@ class ThrusterSection(Section):
     )
     force: Force | None = Field("Thrust, N.", "10 N")
     torque: Torques | None = Field(
-        "Torque about the center of mass, N m, in place of position, direction and force.",
+        "Torque about the centre of mass, N m, in place of position, direction and force.",
         [0, "-8 N m", 0],
     )
     lever_arm: Lever | None = Field(
@@ -860,17 +818,13 @@ class ThrusterSection(Section):
     min_on_time: Time = Field("Shortest firing, s; default 0.", "20 ms", default=0.0)
     max_on_time: PositiveTime | None = Field("Longest firing, s. Default: no limit.", "2 s")
     valve: ValveSection | None = Field(
-        (
-            "How the thrust follows a command. Default: as the valve of the file, or full thrust "
-            "at once."
-        ),
+        "How the thrust follows a command. Default: as the valve of the file, or full thrust at "
+        "once.",
         {"open_delay": "8 ms", "close_delay": "12 ms"},
     )
     impulse_bit: ImpulseBits | None = Field(
-        (
-            "Table from tests, in place of valve. Each row has on-time, s, impulse, N s, and the "
-            "time of its centroid after the start of the command, s."
-        ),
+        "Table from tests, in place of valve. Each row has on-time, s, impulse, N s, and the time "
+        "of its centroid after the start of the command, s.",
         [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
     )
 
@@ -892,10 +846,7 @@ class RequirementSection(Section):
         "Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg"
     )
     momentum_shift: AcuteAngle | None = Field(
-        (
-            "Largest turn of H from t = 0, rad, above 0 and below 90 deg. With a target give "
-            "pointing."
-        ),
+        "Largest turn of H from t = 0, rad, above 0 and below 90 deg. With a target give pointing.",
         "0.2 deg",
     )
     pointing: AcuteAngle | None = Field(
@@ -903,17 +854,13 @@ class RequirementSection(Section):
         "0.2 deg",
     )
     nutation_during: AcuteAngle | None = Field(
-        (
-            "Largest nutation angle on the way, rad, above 0 and below 90 deg. It is a cone of "
-            "the spin axis about H. For other cones see keep."
-        ),
+        "Largest nutation angle on the way, rad, above 0 and below 90 deg. It is a cone of the "
+        "spin axis about H. For other cones see keep.",
         "2 deg",
     )
     spin: SpinError | None = Field(
-        (
-            "Tolerance of the spin at the end about goal.spin or --spin, rad/s or % of it; "
-            "default 1 %."
-        ),
+        "Tolerance of the spin at the end about goal.spin or --spin, rad/s or % of it; default 1 "
+        "%.",
         "0.5 %",
     )
     probability: Probability | None = Field(
@@ -928,10 +875,8 @@ class GoalSection(Section):
         "Angle of the target axis from H at t = 0, rad, below 180 deg.", "10 deg"
     )
     azimuth: Angle | None = Field(
-        (
-            "Azimuth of the target axis about H, rad, from the initial tilt direction of the spin"
-            " axis."
-        ),
+        "Azimuth of the target axis about H, rad, from the initial tilt direction of the spin "
+        "axis.",
         "45 deg",
     )
     right_ascension: RightAscension | None = Field(
@@ -941,10 +886,8 @@ class GoalSection(Section):
         "Declination of the target axis in the frame of attitude, rad.", "22 deg"
     )
     sun_angle: Apart | None = Field(
-        (
-            "Angle of the target axis from the Sun, rad, 0 to 180 deg. The target is the nearest "
-            "such axis on the great circle through the Sun and H at t = 0."
-        ),
+        "Angle of the target axis from the Sun, rad, 0 to 180 deg. The target is the nearest such "
+        "axis on the great circle through the Sun and H at t = 0.",
         "109 deg",
     )
     spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
@@ -986,18 +929,13 @@ class DisturbanceSection(Section):
 
     name: Name | None = Field("Name of the disturbance, for reports.", "leak")
     kind: Literal["constant", "rotating", "axial"] | None = Field(
-        (
-            "constant: fixed in the body. rotating: turns about principal axis 3. axial: along "
-            "the third axis of the file. Default: rotating if rate or fixed_in is given, else "
-            "constant."
-        ),
+        "constant: fixed in the body. rotating: turns about principal axis 3. axial: along the "
+        "third axis of the file. Default: rotating if rate or fixed_in is given, else constant.",
         "rotating",
     )
     torque: DisturbingTorques = Field(
-        (
-            "Torque [M1, M2, M3] about the center of mass, N m. A rotating one: its value at t = "
-            "0, with M3 = 0. An axial one: a single number."
-        ),
+        "Torque [M1, M2, M3] about the centre of mass, N m. A rotating one: its value at t = 0, "
+        "with M3 = 0. An axial one: a single number.",
         ["20 mN m", 0, 0],
     )
     rate: Rate | None = Field(
@@ -1040,10 +978,8 @@ class SpacecraftFile(Section):
         "Moments of inertia: A and C, or tensor, kg m².", {"A": "120 kg m^2", "C": "80 kg m^2"}
     )
     center_of_mass: Position | None = Field(
-        (
-            "Center of mass, m, in the frame of the positions of thrusters and sensor. Default: "
-            "positions count from it."
-        ),
+        "Center of mass, m, in the frame of the positions of thrusters and sensor. Default: "
+        "positions count from it.",
         [0, "2 mm", "0.4 m"],
     )
     center_of_mass_per_kg: Travel | None = Field(
@@ -1077,10 +1013,7 @@ class SpacecraftFile(Section):
         default=[],
     )
     channels: Annotated[dict[Name, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
-        (
-            "Names of thrusters that fire together. Without it each thruster is a channel of its "
-            "own."
-        ),
+        "Names of thrusters that fire together. Without it each thruster is a channel of its own.",
         {"+M1": ["T1", "T2"]},
     )
     steerable: SteerableSection | None = Field(
@@ -1113,10 +1046,8 @@ class SpacecraftFile(Section):
         "Where spin axis and spin must end.", {"tilt": "10 deg", "azimuth": "45 deg"}
     )
     sun: Annotated[InTheSky, _OrWord("epoch")] | None = Field(
-        (
-            "Right ascension and declination of the Sun in the frame of attitude, rad. With epoch"
-            " nutdamp computes them."
-        ),
+        "Right ascension and declination of the Sun in the frame of attitude, rad. With epoch "
+        "nutdamp computes them.",
         "epoch",
         ["120 deg", "10 deg"],
     )
