@@ -1,8 +1,7 @@
 """Nutation-damping planner for spinning spacecraft.
 
 One stream runs through the package: spacecraft file -> Spacecraft -> scheme -> Schedule -> flight
--> report. As a library it is these few names, of which `nutdamp.api` tells more; each is loaded on
-first use.
+-> report. The public names are below; `nutdamp.api` explains them. Each is loaded on first use.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -1,5 +1,5 @@
-"""nutdamp as a library: a function a command, which the command line calls too, so that both give
-the same numbers.
+"""nutdamp as a library. Each command has a function here, which the command line calls, so both
+give the same numbers.
 
     import nutdamp
 
@@ -8,9 +8,9 @@ the same numbers.
     flight = plan.fly()
     flight.to_csv("track.csv")
 
-Attributes are SI and radians, vectors in principal axes unless stated to be in the axes of the
-spacecraft file; arrays with named fields carry the names and units of the CSV files. A wrong
-argument raises BadRequest, as all errors of the package a NutdampError.
+Attributes are in SI, angles in radians. Vectors are in principal axes, unless they are said to be
+in the axes of the spacecraft file. Arrays with named fields have the names and units of the CSV
+files. A wrong argument raises BadRequest, which is a NutdampError like all errors of the package.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def load(
         Keys of the file to change, as ``--set`` does: ``{"limits.horizon": "300 s",
         "thrusters.T1.force": 12.0}``.
 
-    Raises CannotRead, or FaultyFile with everything wrong: in a dict, lines count in its JSON.
+    Raises CannotRead, or FaultyFile with all faults. Line numbers of a dict are those of its JSON.
 
     Examples
     --------
@@ -87,8 +87,9 @@ def load(
 
 
 def read(text: str, name: str = "text") -> Spacecraft:
-    """Read the spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file
-    ``name``.
+    """Read the spacecraft in the ``text`` of a file; faults call the file ``name``.
+
+    Raises FaultyFile with all faults.
 
     Examples
     --------
@@ -102,8 +103,7 @@ def read(text: str, name: str = "text") -> Spacecraft:
 
 
 def example(name: str = "example") -> Spacecraft:
-    """Load the built-in example, or the one of that ``name`` among those of ``nutdamp init
-    --list``.
+    """Load the built-in example, or an example of ``nutdamp init --list`` by its ``name``.
 
     Examples
     --------
@@ -117,8 +117,9 @@ def example(name: str = "example") -> Spacecraft:
 
 
 def check(path: PathName | Mapping[str, object]) -> CheckedFile:
-    """Check a spacecraft file, as ``nutdamp check`` does; raises CannotRead, and FaultyFile with
-    everything wrong.
+    """Check a spacecraft file, as ``nutdamp check`` does.
+
+    Raises CannotRead, or FaultyFile with all faults.
 
     Examples
     --------
@@ -174,19 +175,20 @@ def _expect_options(
 def plan(
     spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any
 ) -> Plan:
-    """Plan one scheme, or the recommended one, and judge it by flying it; an infeasible plan says
-    why.
+    """Plan one scheme, or the recommended one, and fly it to judge it.
+
+    An infeasible plan has its reason in ``why``.
 
     Parameters
     ----------
     spacecraft
         Of `load`, `read` or `example`.
     scheme
-        Name of a scheme; without it that which `compare` recommends. Raises Infeasible where there
-        is none.
+        Name of a scheme. Default: the scheme that `compare` recommends; raises Infeasible if none
+        is feasible.
     options, chosen
-        `Options` of several schemes or those of one, or their fields by keyword, in SI:
-        ``on_time=0.2`` (s).
+        `Options` of several schemes, or the options of one scheme. Or their fields by keyword, in
+        SI: ``on_time=0.2`` (s).
 
     Examples
     --------
@@ -223,17 +225,16 @@ def compare(
     Parameters
     ----------
     names
-        Schemes, default the classic three and optimal, or those that point where the file has a
-        target axis.
+        Schemes. Default: the classic three and optimal; with a target axis the schemes that point.
     options, chosen
-        As of `plan`; each scheme takes those that it has.
-    samples, timed
-        Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values
-        alone; recommend pulses
-        that no command block can fire, too.
+        As for `plan`. Each scheme takes the options that it has.
+    samples
+        Number of dispersed cases of each plan, if the file has dispersions. 0 judges nominal values
+        only.
+    timed
+        Recommend also pulses that no command block can fire.
     robust
-        Try a robust plan where too few cases comply with each of the usual schemes; not with
-        ``samples``.
+        Try a robust plan if too few cases comply with each usual scheme. Not used with ``samples``.
 
     Examples
     --------
@@ -263,18 +264,19 @@ def robust(
     *,
     progress: Progress = lambda _done, _all: None,
 ) -> RobustComparison:
-    """Search the cheapest plan with which enough dispersed cases comply, as ``nutdamp plan
-    --robust`` does.
+    """Find the cheapest plan with which enough dispersed cases comply, as ``nutdamp plan --robust``
+    does.
 
     Raises BadRequest where the spacecraft file has no dispersions.
 
     Parameters
     ----------
     compared
-        The comparison of `compare`: its plans are among the candidates. ``options``: those that it
-        was made with.
+        A comparison from `compare`. Its plans are among the candidates.
+    options
+        The options that the comparison was made with.
     progress
-        Called with the number of attempts made, and that of all.
+        Called with the number of attempts made and the number of all attempts.
 
     Examples
     --------
@@ -294,8 +296,7 @@ def robust(
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
     """Load the pulses of a CSV file as ``plan --csv`` writes it, as a plan of that name.
 
-    Warns where a limit is broken. Raises CannotRead, or
-    FaultyFile.
+    Warns if a limit is broken. Raises CannotRead or FaultyFile.
 
     Examples
     --------
@@ -314,17 +315,18 @@ def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
 def simulate(
     plan: Plan, until: float | None = None, *, flown: bool = False, samples: int = 1000
 ) -> Simulation:
-    """Propagate a plan by the impulse sum (17) and through its real widths, as ``nutdamp simulate``
-    does.
+    """Propagate a plan by the impulse sum (17) and by real widths, as ``nutdamp simulate`` does.
 
     Parameters
     ----------
     plan
-        Of `plan` or `load_schedule`; ``plan(spacecraft, "none")`` is free motion.
-    until, samples
-        End, s, default one inertial nutation period after the last pulse; rows of the track.
+        A plan from `plan` or `load_schedule`. ``plan(spacecraft, "none")`` is free motion.
+    until
+        End, s. Default: one inertial nutation period after the last pulse.
     flown
-        Show the flight through the real widths, not the impulse sum.
+        Show the flight through the real widths instead of the impulse sum.
+    samples
+        Number of rows of the track.
 
     Examples
     --------
@@ -358,11 +360,13 @@ def trade(
     points
         Horizons tried for each front.
     allow
-        How far from its target H may end, rad; a front for each.
-    least, progress
-        ``propellant`` or ``impulse``; called with the number of horizons tried, and that of all.
+        Angles from the target within which H may end, rad. Each gives a front.
+    least
+        Cost to trade: ``propellant`` or ``impulse``.
     nominal
         Judge schedules by nominal values, without dispersed cases.
+    progress
+        Called with the number of horizons tried and the number of all.
 
     Examples
     --------
@@ -397,18 +401,21 @@ def disperse(
 
     Parameters
     ----------
-    samples, seed
-        Number of cases, default as many as show the share required, 20,000 or more; and the seed of
-        their draws: a
-        whole number from 0 to 2**64 - 1.
+    samples
+        Number of cases. Default: enough to show the share required, at least 20,000.
+    seed
+        Seed of the draws, a whole number from 0 to 2**64 - 1.
     threads
-        Default: the processors there are.
+        Number of threads. Default: the number of processors.
     csv
-        File of the inputs and outputs of each case, written as they are flown.
-    remark, progress, stopped
-        Called with notes on the model; with the number of cases flown, and that of all; to end
-        early. A stop before
-        the first case raises KeyboardInterrupt.
+        File for inputs and outputs of each case, written during the flights.
+    remark
+        Called with notes on the model.
+    progress
+        Called with the number of cases flown and the number of all.
+    stopped
+        Called now and then; True ends the study. Before the first case that raises
+        KeyboardInterrupt.
 
     Examples
     --------
@@ -450,8 +457,8 @@ def disperse_loop(
     """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse
     --loop`` does.
 
-    ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible
-    where it cannot damp.
+    ``samples``: default enough to show the share required. For the others see `disperse`. Raises
+    Infeasible if the loop cannot damp.
 
     >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 20, until=60.0)
     <LoopDispersion: 20 of 20 cases comply>
@@ -484,10 +491,11 @@ def loop(
     Parameters
     ----------
     until
-        End, s, default the horizon after the nutation is at ``start``.
-    seed, case
-        Of the noise of the sensor; number (from 1) of a dispersed case of `disperse_loop` with that
-        seed.
+        End, s. Default: the horizon after the nutation is at ``start``.
+    seed
+        Seed of the noise of the sensor.
+    case
+        Number (from 1) of a dispersed case of `disperse_loop` with that seed.
 
     Examples
     --------
@@ -546,11 +554,14 @@ def budget(
 
     Parameters
     ----------
-    thresholds, largest
-        Pairs (start, stop), rad, default those of the loop; nutation by which damping must begin,
-        default as required.
-    seed, progress
-        Of the noise of the sensor; called with the number of pairs done, and that of all.
+    thresholds
+        Pairs (start, stop), rad. Default: the pair of the loop.
+    largest
+        Nutation at which damping must begin, rad. Default: ``requirement.nutation``.
+    seed
+        Seed of the noise of the sensor.
+    progress
+        Called with the number of pairs done and the number of all.
 
     Examples
     --------
@@ -582,11 +593,14 @@ def export(
 
     Parameters
     ----------
-    format, path
-        Name of the format and of the file.
-    until, xml
-        End of a history or spin table, s; CCSDS messages as XML, default where the name ends in
-        .xml.
+    format
+        Name of the format.
+    path
+        Name of the file.
+    until
+        End of a history or spin table, s.
+    xml
+        Write a CCSDS message as XML. Default: if the name of the file ends in .xml.
 
     Examples
     --------
@@ -615,12 +629,15 @@ def fit(
 
     Parameters
     ----------
-    telemetry, sun_pulses, schedule
-        Names of the CSV files, and of that of the pulses fired during the record, or a plan of
-        `load_schedule`.
+    telemetry
+        Name of the CSV file.
+    schedule
+        Pulses fired during the record: the name of their CSV file, or a plan from `load_schedule`.
+    sun_pulses
+        Name of a CSV file with times of Sun pulses.
     ignored
-        Called with columns that are ignored, in place of Python warnings of them and of doubts
-        about the estimates.
+        Called with warnings on ignored columns and doubtful estimates, which are otherwise Python
+        warnings.
 
     Examples
     --------
@@ -664,17 +681,22 @@ def report(
     points: int | None = None,
     **control: str,
 ) -> Report:
-    """Compare the schemes named, and write the page of ``nutdamp report``; raises MissingExtra
-    without the extra plot.
+    """Compare the schemes named, and write the page of ``nutdamp report``.
+
+    Raises MissingExtra without the extra plot.
 
     Parameters
     ----------
-    spacecraft, output
-        One of `load`, or an argument of `load`; HTML file.
-    names, options, disperse
-        As of `compare`, with ``disperse`` for its ``samples``.
+    spacecraft
+        A spacecraft from `load`, or an argument of `load`.
+    output
+        Name of the HTML file.
+    names, options
+        As for `compare`.
+    disperse
+        Number of dispersed cases, as ``samples`` of `compare`.
     points
-        Horizons tried for each front of time against cost, none by default.
+        Number of horizons tried for each front of time against cost. Default: no fronts.
     control
         Texts of title, document, issue, author, date; see ``report --help``.
 

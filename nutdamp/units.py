@@ -133,6 +133,10 @@ _QUANTITY = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL
 )
 _DECIMAL_COMMA = re.compile(r"[^,.]*[0-9],[0-9][^,.]*")
+# sign, whole hours or degrees, the mark behind them, minutes and seconds, in range or not
+_SEXAGESIMAL = re.compile(
+    r"([-+]?)([0-9]+)\s*(h|d|deg|°|:)\s*([0-9]+)\s*[m'′:]?\s*([0-9]*\.?[0-9]*)\s*[s\"″]?"
+)
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
 _WORDS = {
@@ -198,8 +202,22 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         raise ValueError(f"{shown(text)} has a decimal comma; write {cure}")
     hours = re.fullmatch(HOURS, text.strip()) if kind == "right ascension" else None
     if hours is not None:
-        minutes = float(hours[2]) + float(hours[4] or 0.0) / 60.0
-        return float(hours[1]) + minutes / 60.0, expected.factors["h"]
+        late = float(hours[2]) + float(hours[4] or 0.0) / 60.0
+        return float(hours[1]) + late / 60.0, expected.factors["h"]
+    parts = _SEXAGESIMAL.fullmatch(text.strip())
+    if parts is not None and kind in ("angle", "right ascension"):
+        sign, whole, mark, minutes, seconds = parts.groups()
+        if kind == "right ascension" and mark in "h:":
+            raise ValueError(
+                f"{shown(text)} is not a right ascension: expected hours from 0 to 23, minutes "
+                "from 0 to 59, seconds from 0 to below 60, as in 18h 12m 33s"
+            )
+        angle = int(whole) + int(minutes) / 60.0 + float(seconds.strip(".") or 0.0) / 3600.0
+        raise ValueError(
+            f"{shown(text)} has minutes; write decimal degrees: "
+            f"{sign}{angle * (15.0 if mark == 'h' else 1.0):.8g} deg "
+            "(a declination is from -90 deg to 90 deg)"
+        )
     match = _QUANTITY.fullmatch(text)
     # A "unit" that starts like the rest of a number has a thousands separator before it.
     if match is None or re.match(r"[0-9.,_']", match[2]):

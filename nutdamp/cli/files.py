@@ -36,6 +36,7 @@ from nutdamp.cli.main import (
 from nutdamp.cli.options import (
     END,
     FILE,
+    OF_RECORD,
     OUTPUT,
     Count,
     Grouped,
@@ -293,7 +294,8 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm
     also mass, and orbit for its state. Vectors are in the axes of that file, those of opm in
-    attitude.frame. A frame of the ecliptic or of date is turned into EME2000.
+    attitude.frame. A frame of the ecliptic or of date is turned into EME2000. IXY, IXZ and IYZ are
+    products of inertia as in CCSDS 504.0-B-2: minus the entries of inertia.tensor.
     """
     from nutdamp.api import export
     from nutdamp.views.verdict import stated
@@ -327,7 +329,11 @@ def export_command(job: Job, form: str, xml: bool, until: float | None) -> None:
 )
 @click.option("--into", type=FILE, help="Spacecraft file into which the message is merged.")
 @click.option("--inertia", is_flag=True, help="Merge moments of inertia and mass too.")
-@click.option("--at", type=END, help="Record of a history, after its first; default the first.")
+@click.option(
+    "--at",
+    type=OF_RECORD,
+    help="Take the next record of a history after so long, such as 12.5s; default 0s, the first.",
+)
 @click.option(
     "--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`."
 )
@@ -337,11 +343,12 @@ def import_command(
 ) -> None:
     """Make a spacecraft file from an attitude message, or merge one into a file.
 
-    Read are CCSDS messages of version 2 in KVN (APM, AEM, ACM) and attitude files of STK (.a). With
-    --into attitude, epoch and rates, of a history those of one record, replace those of a
-    spacecraft file; all else stays. Without it the message needs inertia and the motion: angular
-    velocity or spin. It knows no thrusters; where all its manoeuvres are transverse and of one
-    torque, the file gets a steerable torquer of that torque. FILE may be - for standard input.
+    It reads CCSDS messages of version 2 in KVN (APM, AEM, ACM) and attitude files of STK (.a). With
+    --into, attitude, epoch and rates replace those of a spacecraft file; all else stays. Of a
+    history one record is used, the one of --at. Without --into the message needs inertia and the
+    motion: angular velocity or spin. A message has no thrusters. If all its manoeuvres are
+    transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be -
+    for standard input.
     """
     *form, file = given
     if form not in ([], ["apm"]):
@@ -371,13 +378,12 @@ def import_command(
         text, body, pulses = imported(contents, file)
         sheet = (schedule, lambda: pulse_table(flown(body, pulses)).csv())
         deliver([(output, lambda: text), sheet])
-        remarks, doubts = contents.remarks, contradictions(contents, body, "the latter nutation")
+        remarks, doubts = contents.remarks, contradictions(contents, body, "this one")
         if pulses.pulses and schedule is None:
             remarks += (f"{len(pulses)} manoeuvres; --schedule FILE writes them",)
     for entry in remarks:
         job.remark(f"{file}: {entry}")
-    for entry in doubts:
-        say(f"{file}: warning: {entry}")
+    job.note(doubts)
 
 
 POINTS = 6  # horizons tried for each front where no number follows ``--trade``

@@ -99,6 +99,11 @@ class UnitType(click.ParamType):  # type: ignore[type-arg]
 
 
 END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
+OF_RECORD = UnitType(
+    "time",
+    lambda time: units.expect(time >= 0.0, "at", time, ""),
+    "expected the time after the first record, 0 or more, such as 0s or 12.5s",
+)
 
 
 class Angles(NamedTuple):

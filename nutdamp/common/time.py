@@ -53,6 +53,10 @@ FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
 
 DIGITS = 9  # of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond
 
+# s; a record that is farther from t = 0 is named: no state is carried on for a month without new
+# telemetry, and a slip in a date is mostly one of a month or a year
+MONTH = 30 * 86_400.0
+
 _J2000 = Fraction(883_655_957_816, 1000)
 """Seconds from 1972-01-01T00:00:00 UTC, which was 00:00:42.184 TT, to 2000-01-01T12:00:00 TT."""
 

@@ -134,7 +134,7 @@ OUTGROWN = 4.0  # multiple of the expected dead band at which a loop does not ho
 OVERSHOOT = 0.82
 # growth of the nutation from the first of many firings to the middle, and on, where it is not held
 RISING = 1.1
-SPENT = "the limit cycle is not reached within the budget of work"
+SPENT = "the budget of work was used up before the limit cycle was reached"
 TOO_FAST = "the nutation grows faster than the firings damp it"
 REFINED = 4  # steps in which the moment of a firing is found on a continuous signal
 
@@ -347,7 +347,7 @@ class Map:
         now = np.abs(at.z[rows])
         if (now <= FARTHEST * self.start).any():
             raise Infeasible(
-                "a firing leaves nothing that could grow: sensor and valves have no errors"
+                "a firing leaves no nutation that could grow: sensor and valves have no errors"
             )
         if self.near is not None:
             far = now < self.near

@@ -431,7 +431,7 @@ class Pilot:
     ) -> None:
         truth = case.truth
         if shed(truth) is not None:
-            problem = "a loop flies with constant moments of inertia; leave this out"
+            problem = "a loop flies with constant moments of inertia; leave out this key"
             raise Unsuitable(("tank", "inertia_per_kg"), problem)
         self.law = law
         self.truth = truth

@@ -337,8 +337,8 @@ class LoopStudy(DrawnCases):
         if price * samples > MOST_SAMPLES:
             affordable = max(MOST_SAMPLES // price, 1)
             raise BadRequest(
-                f"{samples} cases look at about {looked * samples:.2g} samples: too many; "
-                f"at most {affordable} --samples, or an earlier --until"
+                f"{samples} cases take about {looked * samples:.2g} sensor samples, too many; "
+                f"use at most {affordable} --samples, or an earlier --until"
             )
         return looked * samples
 

@@ -164,8 +164,8 @@ class LoopPlan(Plan):
     """Pulses fired by a loop in a ``flown_run``, with its flight; ``known`` is the spacecraft as
     the law knows it.
 
-    With growing nutation the same pulses fired again without looking would not do the same: errors
-    of rounding grow.
+    The same pulses without the sensor leave another nutation where it grows, because errors of
+    rounding grow with it.
     """
 
     flown_run: LoopRun = field(kw_only=True)

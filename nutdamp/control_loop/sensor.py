@@ -289,9 +289,9 @@ class Estimator:
             return np.empty(times.shape, dtype=complex)
         if self.window > WINDOW:
             raise Infeasible(
-                "an accelerometer's sine is fitted over a nutation period, "
-                f"{self.window:.2g} samples at this rate: "
-                f"{WINDOW:.0e} at most; a lower loop.sensor.rate helps"
+                "the fit of an accelerometer takes the samples of a nutation period: "
+                f"{self.window:.2g} at this rate, of at most {WINDOW:.0e}; lower "
+                "loop.sensor.rate"
             )
         self._fit = self._fit or _fit(
             np.asarray(self.law.rate(spin[..., :1])), self.step, self.window

@@ -88,9 +88,9 @@ def too_late(margin: Margin) -> str:
     if margin.delay == -np.inf:
         return f"the loop does not damp: {what}; raise start, or allow other on-times"
     return (
-        f"the loop does not damp: {what}: it comes up to {late:.4g} deg late, "
-        f"and damps up to {latest:.4g} deg; "
-        f"shorten the delays by {-margin.delay:.4g} s, or set predict: true"
+        f"the loop does not damp: {what}. It fires up to {late:.4g} deg late, and damps "
+        f"up to {latest:.4g} deg; shorten the delays by {-margin.delay:.4g} s, or set "
+        "predict: true"
     )
 
 

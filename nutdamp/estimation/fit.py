@@ -105,7 +105,8 @@ def expect_alive(model: Model) -> tuple[str, ...]:
         )
         if name in KIND and np.mean(absurd(model.spacecraft, name, values)) > BROKEN:
             faults.append(
-                f"{name} shows {np.abs(values).max():.3g} {KIND[name].unit}, which no motion is"
+                f"{name} shows {np.abs(values).max():.3g} {KIND[name].unit}, which no motion "
+                "can give"
             )
         elif off and alike >= max(min(FEWEST, len(values)), BROKEN * len(values)):
             faults.append(
@@ -113,12 +114,12 @@ def expect_alive(model: Model) -> tuple[str, ...]:
             )
         elif at_an_end > SATURATED and name not in spins and not damped:
             share = 100.0 * at_an_end
-            faults.append(f"{name} is at its largest or least value in {share:.3g} % of samples")
+            faults.append(f"{name} is at its largest or smallest value in {share:.3g} % of samples")
     if faults:
         shows = {name for name in model.signals if KIND[name].nutation}
         others = " while others show a nutation" if constant & shows and shows - constant else ""
         cure = (
-            "the sensor is dead, stuck or saturated; leave its column out, or end the record before"
+            "the sensor is dead, stuck or saturated; leave out its column, or end the record before"
         )
         raise Infeasible(f"{'; '.join(faults)}{others}: {cure}")
     return GYROS if steady else ()
@@ -172,18 +173,16 @@ def expect_enough(model: Model) -> None:
     """Raise Infeasible for a record that cannot tell as much as is estimated."""
     if not any(KIND[name].nutation for name in model.signals):
         raise Infeasible(
-            f"no nutation is seen in {' and '.join(model.signals)} "
-            f"alone{once_a_turn(model.record)}; omega_1 or "
-            "omega_2, the axis, an acceleration, Sun aspect angles or crossings beside them would "
-            "show it"
+            f"{' and '.join(model.signals)} alone cannot show "
+            f"nutation{once_a_turn(model.record)}; add omega_1 or omega_2, the axis, an "
+            "acceleration, Sun aspect angles or crossings"
         )
     rows = len(np.unique(model.times))
     free = sum(math.isinf(parameter.prior) for parameter in model.parameters)
     if len(model.measured) <= free + 2:
         raise Infeasible(
-            f"the samples (rows: {rows}, values: {len(model.measured)}) cannot tell {free} "
-            "unknowns; a longer record, "
-            "or more samples, helps"
+            f"the samples (rows: {rows}, values: {len(model.measured)}) are too few for "
+            f"{free} unknowns; use a longer record, or more samples"
         )
     spacecraft, length = model.spacecraft, model.record.length
     period = rigid_body.body_period(
@@ -193,9 +192,9 @@ def expect_enough(model: Model) -> None:
         period = spacecraft.inertial_period
     if length < 0.5 * period:
         raise Infeasible(
-            f"the record is too short: {length:.3g} s are {length / period:.2g} of a nutation "
-            f"period ({period:.3g} s); "
-            f"at least one period, {period:.3g} s, is needed"
+            f"the record is too short: it has {length:.3g} s, {length / period:.2g} of a "
+            f"nutation period ({period:.3g} s); at least one period, {period:.3g} s, is "
+            "needed"
         )
 
 
@@ -226,16 +225,16 @@ def expect_explained(fitted: Fit) -> None:
         out = float(np.mean(~fitted.used[model.signal == index]))
         if out > BROKEN:
             raise Infeasible(
-                f"the motion fitted does not explain {signal}: {100.0 * out:.0f} % of it would be "
-                "left out"
+                f"the fitted motion does not explain {signal}: {100.0 * out:.0f} % of its "
+                "samples would be left out"
             )
     burst = left_out_together(fitted)
     if burst is not None:
         signal, begins, ends, count = burst
         raise Infeasible(
-            f"from {begins:.4g} s to {ends:.4g} s the motion fitted does not explain {signal}: "
-            f"{count} samples would "
-            f"have to be left out, which is motion and no outlier; {_cure(fitted)}"
+            f"from {begins:.4g} s to {ends:.4g} s the fitted motion does not explain "
+            f"{signal}: {count} samples in a row differ, so they are motion and not "
+            f"outliers; {_cure(fitted)}"
         )
     unexplained = [index for index in range(len(model.signals)) if _more_than_noise(fitted, index)]
     if not unexplained:
@@ -243,8 +242,8 @@ def expect_explained(fitted: Fit) -> None:
     signals = ", ".join(model.signals[index] for index in unexplained)
     more = max(fitted.noise[index] / _noise(fitted, index) for index in unexplained)
     says = (
-        f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the "
-        "noise between samples"
+        f"the fitted motion does not explain {signals}: residuals are {more:.2g} times "
+        "the noise between samples"
     )
     time = step(fitted, unexplained)
     where = "" if time is None else f", with a step at about {time:.4g} s"
@@ -258,7 +257,7 @@ def _cure(fitted: Fit) -> str:
         if fired
         else "give the pulses fired in it with --schedule"
     )
-    return f"{what}; a record of the coast before or after needs none"
+    return f"{what}; or use a record of the coast before or after it"
 
 
 def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
@@ -414,8 +413,8 @@ def fit(spacecraft: Spacecraft, record: Record) -> Fit:
         if not spent.exhausted:
             raise
         raise Infeasible(
-            f"{error}; or the search, which ended with its budget of work, has not come to it: "
-            "fewer samples may help"
+            f"{error}; or the search used up its budget of work before it found the motion: "
+            "try fewer samples"
         ) from None
     return replace(best, finished=not spent.exhausted)
 
@@ -524,7 +523,8 @@ def expect_told(fitted: Fit) -> None:
     ):
         names = ", ".join(fitted.model.parameters[at].name for at in free)
         raise Infeasible(
-            f"the record does not tell all of {names}: a sensor is dead, or more signals are needed"
+            f"the record does not determine all of {names}: a sensor is dead, or more "
+            "signals are needed"
         )
 
 
@@ -597,8 +597,8 @@ def _sees_nutation(fitted: Fit) -> bool:
         if fitted.model.spacecraft.transverse_rate >= SEEN * sigma:
             raise Infeasible(
                 f"no nutation is seen: the transverse rate is {math.degrees(size):.3g} deg/s, "
-                "within the noise, and the file has more; set state.nutation: 0 deg if the body "
-                "spins steadily, else check the sensors; less noise or a probe pulse helps too"
+                "within the noise, and the file has more; if the body spins steadily, set "
+                "state.nutation to 0; else check the sensors, or fire a probe pulse"
             )
     return seen
 

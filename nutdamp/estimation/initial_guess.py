@@ -453,10 +453,9 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     allowed = [fitted for fitted in alike if low < fitted.values[at] < high]
     if not allowed and too_slow(model, alike[0].values):
         raise Infeasible(
-            f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, "
-            "and none of their "
-            "C/A is as near to the file as its tolerances allow; "
-            "check A and C in the file (are the times in seconds?)"
+            f"with a sample every {interval(model):.4g} s several nutation rates fit "
+            "equally well, and none gives a C/A within the tolerances of the file; check A "
+            "and C in the file (are the times in seconds?)"
         )
     allowed = allowed or alike[:1]
     if len(allowed) == 1:
@@ -464,12 +463,10 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     ratios = sorted(float(fitted.values[at]) for fitted in allowed)
     fastest = max(abs(nutation_rate(model, fitted.values)) for fitted in allowed)
     raise Infeasible(
-        f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: "
-        "C/A may be "
-        f"{', '.join(f'{ratio:.4f}' for ratio in ratios)}; "
-        f"samples less than {math.pi / fastest:.3g} s apart or at "
-        "uneven intervals, or smaller tolerances of A and C in the file, "
-        "help (are the times in seconds?)"
+        f"with a sample every {interval(model):.4g} s several nutation rates fit "
+        f"equally well: C/A may be {', '.join(f'{ratio:.4f}' for ratio in ratios)}; use "
+        f"samples less than {math.pi / fastest:.3g} s apart or at uneven intervals, or "
+        "smaller tolerances of A and C (are the times in seconds?)"
     )
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.common.numerics import RPM, finite
 from nutdamp.common.results import Note, note
+from nutdamp.common.time import MONTH
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.fit import expect_alive, expect_enough, fit, step
@@ -657,6 +658,8 @@ def doubts(fitted: Fit) -> Iterator[Note]:
     model = fitted.model
     if not fitted.finished:
         yield note("fit-cut")
+    if abs(model.record.start) > MONTH:
+        yield note("record-far", apart_lasting_s=abs(model.record.start))
     if far := far_from_file(fitted):
         pairs = (
             (row, row.factor * row.value, row.factor * (row.file or 0.0), off) for row, off in far

@@ -179,10 +179,8 @@ class Section:
             else:
                 values[name] = key.default
                 if key.default is REQUIRED and name not in value:
-                    what = key.description
-                    problems.append(
-                        ((*path, name), f"missing; {what[:1].lower()}{what[1:].rstrip('.')}")
-                    )
+                    what = key.description.partition(". ")[0].rstrip(".")
+                    problems.append(((*path, name), f"missing; {what[:1].lower()}{what[1:]}"))
         return cls(values)
 
 

@@ -216,8 +216,8 @@ class DispersionsSection(Section):
 
     correlation: list[tuple[str, str, Correlation]] = Field(
         "Pairs of inputs that vary together, named as in disperse --json, and their correlation, "
-        "-1 to 1;"
-        " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
+        "-1 to 1. For uniform and triangular inputs it is that of underlying normals (Gaussian "
+        "copula).",
         [["A", "C", 0.99]],
         default=[],
     )
@@ -312,31 +312,32 @@ class LoopSensorSection(Section):
     """Sensor of the loop: two rate gyros about axes 1 and 2, or an accelerometer."""
 
     kind: Literal["gyro", "accelerometer"] = Field(
-        "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"
+        "gyro: shows ω1 and ω2. accelerometer: shows the acceleration at position along axis.",
+        "gyro",
     )
     axes: Literal["file", "principal"] = Field(
-        "Axes about which gyros measure: those of the file, in which a tilted axis 3 shows as a "
-        "rate, or the principal "
-        "ones, of gyros that are calibrated so. Default file.",
+        "Axes about which gyros measure. file (default): those of the file, where a tilted "
+        "principal axis shows as a rate. principal: those of gyros calibrated to the principal "
+        "axes.",
         "principal",
         default="file",
     )
-    rate: Frequency | None = Field("Samples a second, Hz; default: a continuous signal.", "100 Hz")
+    rate: Frequency | None = Field("Samples a second, Hz. Default: a continuous signal.", "100 Hz")
     quantisation: Least = Field(
-        "Step of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.002 deg/s", default=0.0
+        "Step of a sample, rad/s; of an accelerometer m/s². Default 0.", "0.002 deg/s", default=0.0
     )
     noise: Least = Field(
-        "One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.",
+        "One sigma of the noise of a sample, rad/s; of an accelerometer m/s². Default 0.",
         "0.01 deg/s",
         default=0.0,
     )
     bias: Annotated[float, Reading()] = Field(
-        "What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.",
+        "What a signal shows without motion, rad/s; of an accelerometer m/s². Default 0.",
         "0.02 deg/s",
         default=0.0,
     )
     scale: Annotated[float, Quantity("ratio")] = Field(
-        "Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.",
+        "Signal divided by truth; default 100 %. A reversed sensor has -100 %.",
         "101 %",
         default=1.0,
     )
@@ -349,65 +350,64 @@ class LoopSensorSection(Section):
         default=0.0,
     )
     position: Position | None = Field(
-        "Where an accelerometer is, from the center of mass, or as center_of_mass is given, m.",
+        "Place of an accelerometer, m, from the center of mass or as center_of_mass says.",
         ["0.8 m", 0, 0],
     )
     axis: Direction | None = Field(
-        "Along which an accelerometer measures, any length but zero; default [0, 0, 1].", [0, 0, 1]
+        ("Direction in which an accelerometer measures, any length but zero; default [0, 0, 1]."),
+        [0, 0, 1],
     )
 
 
 class LoopFaultsSection(Section):
-    """Faults that the loop is flown with and does not know of."""
+    """Faults that the loop is flown with, and that it does not know."""
 
     reversed: list[Name] = Field(
-        "Channels that push the other way when they are fired.", ["+M1"], default=[]
+        "Channels that push the other way when fired.", ["+M1"], default=[]
     )
 
 
 class LoopSection(Section):
-    """A closed loop, for `nutdamp loop`:
-    it fires from where the sensor shows start down to stop.
+    """A closed loop, for `nutdamp loop`: it fires when the sensor shows start, until it shows
+    stop.
     """
 
     sensor: LoopSensorSection = Field(
         "The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"}
     )
     law: Literal["four-pulse", "one-pulse", "bang"] = Field(
-        "four-pulse: each channel that comes into line, as long as what is left requires, at most "
-        "on_time; one-pulse: the same, at most half a nutation period; bang: each for on_time. "
-        "Default four-pulse.",
+        "four-pulse (default): each channel that comes into line fires as long as needed, at most "
+        "on_time. one-pulse: the same, at most half a nutation period. bang: each fires for "
+        "on_time.",
         "four-pulse",
         default="four-pulse",
     )
     start: AcuteAngle = Field(
-        "Nutation angle from which the loop fires, rad; above stop.", "0.5 deg"
+        "Nutation angle at which the loop begins to fire, rad; above stop.", "0.5 deg"
     )
     stop: Nutation = Field(
-        "Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0
+        "Nutation angle at which it stops, rad; default 0.", "0.05 deg", default=0.0
     )
     settle: Time = Field(
-        "Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0
+        "Time after a firing in which samples are ignored, s; default 0.", "0.2 s", default=0.0
     )
     min_interval: Time = Field(
-        "Least time from firing to firing, s; default 0.", "0.5 s", default=0.0
+        "Least time from one firing to the next, s; default 0.", "0.5 s", default=0.0
     )
     predict: bool = Field(
-        "Whether delay, filter and half the on-time are compensated, "
-        "so that firings are centred on "
-        "their moments; default true.",
+        "true (default): firings are centred on their moments, with delay, filter and half the "
+        "on-time compensated.",
         True,
         default=True,
     )
     alias: bool = Field(
-        "Whether fewer than four samples a nutation period are meant; default false.",
+        "true: fewer than four samples in a nutation period are intended; default false.",
         True,
         default=False,
     )
     on_time: PositiveTime | None = Field(
-        "Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: "
-        "an eighth of the "
-        "nutation period, within min_on_time and max_on_time.",
+        "On-time of bang, and longest on-time of four-pulse, s. Default of four-pulse: an eighth "
+        "of the nutation period, within min_on_time and max_on_time.",
         "50 ms",
     )
     faults: LoopFaultsSection | None = Field(
@@ -533,8 +533,8 @@ Count = Annotated[int, Within(1, 1_000_000)]
 
 
 class OrbitSection(Section):
-    """Position of the spacecraft at t = 0, at attitude.epoch and in attitude.frame; for messages to
-    flight dynamics.
+    """Position and velocity at attitude.epoch, in attitude.frame. They are for messages to flight
+    dynamics.
     """
 
     position: Position = Field("Position from the center, m.", ["7000 km", 0, 0])
@@ -543,37 +543,35 @@ class OrbitSection(Section):
 
 
 class WheelSection(Section):
-    """A part that turns otherwise than the body: a momentum wheel, or a despun platform."""
+    """A part that spins relative to the body: a momentum wheel, or a despun platform."""
 
     momentum: Annotated[float, Quantity("momentum")] = Field(
-        (
-            "Its constant angular momentum along principal axis 3, signed, N m s, "
-            "beside the C ω3 of all else."
-        ),
+        "Its constant angular momentum along principal axis 3, signed, N m s. It adds to the C ω3 "
+        "of the rest.",
         "40 N m s",
     )
 
 
 class SunSensorSection(Section):
-    """A sensor that gives a pulse in each spin, when the Sun passes it."""
+    """A sensor that gives a pulse once a spin, when it sees the Sun."""
 
     azimuth: Angle = Field(
-        "Azimuth in the body at which the Sun pulse comes, about axis 3 from axis 1, rad.", "35 deg"
+        "Azimuth in the body at which the Sun pulse comes, rad, about axis 3 from axis 1.", "35 deg"
     )
     elevation: Declination = Field(
-        (
-            "Middle of its view, from the plane square to axis 3 towards the spin axis, rad; "
-            "default 0."
-        ),
+        "Middle of its view, rad, from the plane square to axis 3 towards the spin axis; default "
+        "0.",
         "45 deg",
         default=0.0,
     )
     half_width: Apart = Field(
-        "How far from there it sees the Sun, rad; default 90 deg, which is always.",
+        "Largest angle from there at which it sees the Sun, rad. Default: 90 deg, which is always.",
         "45 deg",
         default=RIGHT_ANGLE,
     )
-    jitter: Time = Field("One sigma of its pulses, s; default 0.", "0.5 ms", default=0.0)
+    jitter: Time = Field(
+        "One sigma of the times of its pulses, s; default 0.", "0.5 ms", default=0.0
+    )
 
 
 class WidthSection(Section):
@@ -588,44 +586,50 @@ Widths = Annotated[list[PositiveTime], Length(1)] | WidthSection
 
 
 class CommandsSection(Section):
-    """Contents of a command block: so many pulses of one channel, fired by the Sun pulse."""
+    """Contents of a command block: a number of pulses of one channel, fired by the Sun pulse."""
 
     delay_step: PositiveTime = Field("Resolution of the delay after the Sun pulse, s.", "2 ms")
-    delay_max: PositiveTime = Field("Longest delay, s; up to a spin turn is used.", "1.9 s")
+    delay_max: PositiveTime = Field(
+        "Longest delay, s. At most one spin turn of it is used.", "1.9 s"
+    )
     width: Widths = Field(
         "Widths that can be commanded, s: a list, or step, min and max.",
         {"step": "1 ms", "min": "20 ms", "max": "500 ms"},
         ["0.1 s", "0.2 s"],
     )
-    max_count: Count = Field("Most pulses of a block; default 255.", 255, default=255)
+    max_count: Count = Field("Largest number of pulses of a block; default 255.", 255, default=255)
     every: Annotated[list[Count], Length(1)] = Field(
-        "Spins from one pulse to the next that can be chosen; default [1].", [1, 2], default=[1]
+        "Choices of the number of spins from one pulse to the next; default [1].",
+        [1, 2],
+        default=[1],
     )
     per_turn: Annotated[int, Within(1, 2)] = Field(
-        "Blocks that may fire in the same turns, their pulses apart; default 1.", 2, default=1
+        "Number of blocks that may fire in the same turns, without overlap; default 1. With 2, "
+        "prefer delay_is: angle, which keeps opposite pulses apart while the spin changes.",
+        2,
+        default=1,
     )
     delay_is: Literal["time", "angle"] = Field(
-        "time, or angle: that by which the Sun has turned since its pulse; default time.",
+        "How a delay counts. time (default): seconds after the Sun pulse. angle: turn of the Sun "
+        "since its pulse.",
         "angle",
         default="time",
     )
 
 
 class KeepSection(Section):
-    """A cone about a direction in space which the spin axis must not enter, or must not leave,
-    nutation included.
+    """A cone about a direction in space. The spin axis must not enter it (min), or must not leave
+    it (max). Nutation counts.
     """
 
     name: Name = Field("Name of the cone, for reports.", "Earth")
     direction: Annotated[InTheSky, _OrWord("sun")] = Field(
-        "Right ascension and declination in the attitude's frame, rad; or sun.",
+        "Right ascension and declination in the frame of attitude, rad. Or sun.",
         "sun",
         ["120 deg", "10 deg"],
     )
-    min: Apart | None = Field("Least angle to the spin axis, rad; default 0.", "4 deg")
-    max: Apart | None = Field(
-        "Largest angle between it and the spin axis, rad; default 180 deg.", "20 deg"
-    )
+    min: Apart | None = Field("Smallest angle to the spin axis, rad; default 0.", "4 deg")
+    max: Apart | None = Field("Largest angle to the spin axis, rad; default 180 deg.", "20 deg")
 
 
 Pressure = Annotated[float, Quantity("pressure", exclusiveMinimum=0)]
@@ -638,7 +642,7 @@ ImpulseBits = Annotated[list[tuple[PositiveTime, Impulse, PositiveTime]], Length
 
 
 class ValveSection(Section):
-    """A valve: from the command to the thrust, which then rises and falls evenly."""
+    """A valve: thrust begins after the command, then rises and falls evenly."""
 
     open_delay: Time = Field(
         "From the start of the command to the first thrust, s; default 0.", "8 ms", default=0.0
@@ -653,8 +657,8 @@ class ValveSection(Section):
     )
     fall_time: Time = Field("From full thrust to none, s; default 0.", "10 ms", default=0.0)
     on_time_is: Literal["command", "effective"] = Field(
-        "Meaning of a commanded on-time: the length of the command (default), or impulse over full "
-        "thrust, which the electronics of the valve turns into one.",
+        "Meaning of a commanded on-time. command (default): the length of the command. effective: "
+        "impulse over full thrust, which the valve electronics turns into a command.",
         "command",
         default="command",
     )
@@ -663,31 +667,31 @@ class ValveSection(Section):
 class ShedSection(Section):
     """Share of the propellant in the tank in the moments of inertia."""
 
-    A: Shed = Field("Off the transverse moment for each kg used, kg m²/kg.", "0.4 kg m^2/kg")
-    C: Shed = Field("Off the moment about axis 3 for each kg used, kg m²/kg.", "0.6 kg m^2/kg")
+    A: Shed = Field(
+        "Decrease of the transverse moment for each kg used, kg m²/kg.", "0.4 kg m^2/kg"
+    )
+    C: Shed = Field(
+        "Decrease of the moment about axis 3 for each kg used, kg m²/kg.", "0.6 kg m^2/kg"
+    )
 
 
 class TankSection(Section):
-    """A tank in blowdown: the gas expands as the propellant is used,
-    and pressure and thrust fall.
-    """
+    """A blowdown tank: pressure and thrust fall as propellant is used and the gas expands."""
 
     propellant: Mass = Field("Propellant in it at t = 0, kg.", "30 kg")
     pressure: Pressure = Field("Pressure at t = 0, Pa.", "22 bar")
     final_pressure: Pressure = Field("Pressure when the propellant is used up, Pa.", "8 bar")
     exponent: Annotated[float, Quantity("number", minimum=0)] = Field(
-        "Exponent n in thrust ~ pressure^n; default 1.", 1, default=1.0
+        "Exponent n of thrust ~ pressure^n; default 1.", 1, default=1.0
     )
     isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
-        "Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters; "
-        "it runs "
-        "evenly between them, and below the first it is that of the first.",
+        "Rows of pressure, Pa, rising, and specific impulse, s, in place of that of the thrusters."
+        " Values between rows are interpolated. Below the first row its value holds.",
         [["8 bar", "215 s"], ["22 bar", "228 s"]],
     )
     inertia_per_kg: Annotated[list[Shed], Length(3, 3)] | ShedSection | None = Field(
-        "What each kg that is used takes off the moments of inertia, kg m²/kg: A and C, "
-        "or a list of the "
-        "three principal moments, the one about axis 3 last. Default: they stay.",
+        "Decrease of the moments of inertia for each kg used, kg m²/kg. Give A and C, or the three"
+        " principal moments, the one about axis 3 last. Default: they stay.",
         {"A": "0.4 kg m^2/kg", "C": "0.6 kg m^2/kg"},
     )
 
@@ -696,10 +700,10 @@ class ColdSection(Section):
     """Cold nozzles: the first pulses of each channel are weaker."""
 
     first: Annotated[float, Quantity("ratio", exclusiveMinimum=0)] = Field(
-        "Thrust of the first pulse of a channel, over that of a warm one.", "90 %"
+        "Thrust of the first pulse of a channel, as a share of that of a warm one.", "90 %"
     )
     pulses: Annotated[float, Quantity("number", exclusiveMinimum=0)] = Field(
-        "Pulses in which the difference from a warm one falls by a factor of e.", 4
+        "Number of pulses in which the difference from a warm one falls by the factor e.", 4
     )
 
 
@@ -720,7 +724,9 @@ class InertiaSection(Section):
         "Moment of inertia about the spin axis 3, kg m²; at most 2 A.", "80 kg m^2"
     )
     tensor: Tensor | None = Field(
-        "Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
+        "Inertia tensor, 3 rows of 3, kg m². Entries off the diagonal are minus the products of "
+        "inertia: row 1, column 2 is -IXY, with IXY the sum of m x y as in CCSDS messages. Axis 3 "
+        "is the principal axis nearest the file's third axis.",
         [[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]],
     )
 
@@ -728,12 +734,9 @@ class InertiaSection(Section):
 class StateSection(Section):
     """The motion at t = 0 by spin and nutation angle."""
 
-    spin: Rate = Field("Spin rate about axis 3, signed, rad/s; zero only with a wheel.", "30 rpm")
+    spin: Rate = Field("Spin rate about axis 3, signed, rad/s. Zero only with a wheel.", "30 rpm")
     nutation: Nutation = Field(
-        (
-            "Nutation angle between angular momentum and spin axis at t = 0, rad, "
-            "from 0 to below 90 deg."
-        ),
+        ("Nutation angle between H and spin axis at t = 0, rad, from 0 to below 90 deg."),
         "5 deg",
     )
     phase: Angle = Field(
@@ -742,9 +745,7 @@ class StateSection(Section):
 
 
 class AttitudeSection(Section):
-    """Attitude at t = 0; without it results refer to the frame with
-    z along the angular momentum.
-    """
+    """Attitude at t = 0. Without it results refer to the frame with z along H."""
 
     schema_extra: ClassVar = {
         "oneOf": [
@@ -754,39 +755,34 @@ class AttitudeSection(Section):
     }
 
     quaternion: Quaternion | None = Field(
-        "Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0]
+        "Rotation from body to frame, scalar first. It is normalised when read.", [1, 0, 0, 0]
     )
     spin_axis: InTheSky | None = Field(
-        "Instead of quaternion: right ascension and declination of the spin axis, rad; see phase.",
+        "Right ascension and declination of the spin axis, rad, in place of quaternion. See phase.",
         ["120 deg", "-15 deg"],
     )
     phase: Angle | None = Field(
-        "Angle about spin_axis from its ascending node (z of the frame × spin axis; "
-        "x of the frame at a pole) to body "
-        "axis 1, rad; default 0.",
+        "Angle about spin_axis from its ascending node to body axis 1, rad; default 0. The "
+        "ascending node is z of the frame × spin axis; at a pole it is x of the frame.",
         "20 deg",
     )
     sun_phase: Angle | None = Field(
-        (
-            "Instead of phase: angle about spin_axis from the side of the Sun to body axis 1, rad; "
-            "needs sun."
-        ),
+        "Angle about spin_axis from the side of the Sun to body axis 1, rad, in place of phase. It"
+        " needs sun.",
         "35 deg",
     )
     of: Literal["axis", "momentum"] | None = Field(
-        (
-            "Vector that spin_axis and phase are of: the spin axis itself (default), "
-            "or the angular momentum."
-        ),
+        "The vector whose direction spin_axis and phase give: the spin axis itself (default), or "
+        "the angular momentum.",
         "momentum",
     )
     epoch: DateAndTime | None = Field(
-        "Date and time of t = 0, ISO 8601, from 1972 to 9999; without a zone it is UTC.",
+        "Date and time of t = 0, ISO 8601, from 1972 to 9999. Without a zone it is UTC.",
         "2026-03-01T12:00:00Z",
     )
     frame: Literal["EME2000", "J2000", "GCRF", "ECLIPJ2000", "ECLIPDATE", "MOD"] | None = Field(
-        "Inertial frame of the attitude and of every direction of the file; in a frame of the "
-        "ecliptic right ascension and declination stand for longitude and latitude.",
+        "Inertial frame of the attitude and of all directions of the file. In a frame of the "
+        "ecliptic, right ascension and declination are longitude and latitude.",
         "EME2000",
     )
 
@@ -801,43 +797,43 @@ class ThrusterSection(Section):
         ]
     }
 
-    name: Name = Field("Name of the thruster, used by channels and in schedules.", "T1")
+    name: Name = Field("Name of the thruster, for channels and schedules.", "T1")
     position: Position | None = Field(
-        "Where the force acts, from the center of mass, or as center_of_mass is given, m.",
+        "Point where the force acts, m, from the center of mass or as center_of_mass says.",
         [0, "0.5 m", "0.8 m"],
     )
     direction: Direction | None = Field(
-        "Direction of the force on the spacecraft (against the plume), any length but zero.",
+        "Direction of the force on the spacecraft, against the plume. Any length but zero.",
         [1, 0, 0],
     )
     force: Force | None = Field("Thrust, N.", "10 N")
     torque: Torques | None = Field(
-        "Torque about the centre of mass, N m; instead of position, direction and force.",
+        "Torque about the centre of mass, N m, in place of position, direction and force.",
         [0, "-8 N m", 0],
     )
     lever_arm: Lever | None = Field(
-        "Lever arm, m, that gives the thrust of a torque, for the propellant.", "0.8 m"
+        "Lever arm, m. With a torque it gives the thrust, for the propellant.", "0.8 m"
     )
     isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
     min_on_time: Time = Field("Shortest firing, s; default 0.", "20 ms", default=0.0)
-    max_on_time: PositiveTime | None = Field("Longest firing, s; default: no limit.", "2 s")
+    max_on_time: PositiveTime | None = Field("Longest firing, s. Default: no limit.", "2 s")
     valve: ValveSection | None = Field(
-        "How the thrust follows a command; default: that of the file, or full thrust at once.",
+        "How the thrust follows a command. Default: as the valve of the file, or full thrust at "
+        "once.",
         {"open_delay": "8 ms", "close_delay": "12 ms"},
     )
     impulse_bit: ImpulseBits | None = Field(
-        "Instead of valve a table from tests: rows of on-time, s, impulse, N s, "
-        "and its centroid after the "
-        "start of the command, s.",
+        "Table from tests, in place of valve. Each row has on-time, s, impulse, N s, and the time "
+        "of its centroid after the start of the command, s.",
         [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
     )
 
 
 class SteerableSection(Section):
-    """A torquer for any transverse axis; body-fixed during one pulse."""
+    """A torquer for any transverse axis. It is fixed in the body during a pulse."""
 
     torque: Torque | None = Field(
-        "Torque, N m; without it ideal impulses of no duration.", "20 N m"
+        "Torque, N m. Without it its impulses are ideal and take no time.", "20 N m"
     )
     isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
     lever_arm: Lever | None = Field("Lever arm, m, for the propellant.", "1 m")
@@ -850,56 +846,48 @@ class RequirementSection(Section):
         "Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg"
     )
     momentum_shift: AcuteAngle | None = Field(
-        "Largest turn of the angular momentum from t = 0, rad, above 0 and below 90 deg; "
-        "with a target give pointing.",
+        "Largest turn of H from t = 0, rad, above 0 and below 90 deg. With a target give pointing.",
         "0.2 deg",
     )
     pointing: AcuteAngle | None = Field(
-        "Largest angle of the angular momentum from the target, see goal, rad, "
-        "above 0 and below 90 deg.",
+        "Largest angle of H from the target of goal, rad, above 0 and below 90 deg.",
         "0.2 deg",
     )
     nutation_during: AcuteAngle | None = Field(
-        "Largest nutation angle on the way, rad, above 0 and below 90 deg: "
-        "a cone of the spin axis about the angular "
-        "momentum, see keep.",
+        "Largest nutation angle on the way, rad, above 0 and below 90 deg. It is a cone of the "
+        "spin axis about H. For other cones see keep.",
         "2 deg",
     )
     spin: SpinError | None = Field(
-        (
-            "Tolerance of the spin about goal.spin, or --spin, at the end, rad/s or % of it; "
-            "default 1 %."
-        ),
+        "Tolerance of the spin at the end about goal.spin or --spin, rad/s or % of it; default 1 "
+        "%.",
         "0.5 %",
     )
     probability: Probability | None = Field(
-        "How surely dispersed flights must meet it, above 0 and below 1 (or in %).", "99.7 %"
+        "Share of dispersed flights that must meet it, above 0 and below 1 (or in %).", "99.7 %"
     )
 
 
 class GoalSection(Section):
-    """End of the motion; without it the angular momentum stays where it is, and the spin may
-    change.
-    """
+    """End of the motion. Without it H stays where it is, and the spin may change."""
 
     tilt: Tilt | None = Field(
-        "Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.", "10 deg"
+        "Angle of the target axis from H at t = 0, rad, below 180 deg.", "10 deg"
     )
     azimuth: Angle | None = Field(
-        "Azimuth of the target axis about the angular momentum, rad, "
-        "from the side to which the spin axis "
-        "leans at t = 0.",
+        "Azimuth of the target axis about H, rad, from the initial tilt direction of the spin "
+        "axis.",
         "45 deg",
     )
     right_ascension: RightAscension | None = Field(
-        "Right ascension of the target axis in the attitude's frame, rad.", "83.6 deg"
+        "Right ascension of the target axis in the frame of attitude, rad.", "83.6 deg"
     )
     declination: Declination | None = Field(
-        "Declination of the target axis in the attitude's frame, rad.", "22 deg"
+        "Declination of the target axis in the frame of attitude, rad.", "22 deg"
     )
     sun_angle: Apart | None = Field(
-        "Angle of the target axis from the Sun, rad, 0 to 180 deg: the nearest such axis, on the "
-        "great circle through the Sun and the angular momentum at t = 0.",
+        "Angle of the target axis from the Sun, rad, 0 to 180 deg. The target is the nearest such "
+        "axis on the great circle through the Sun and H at t = 0.",
         "109 deg",
     )
     spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
@@ -909,14 +897,14 @@ class LimitsSection(Section):
     """Limits of every schedule."""
 
     horizon: PositiveTime | None = Field(
-        "End of the planning time, s; default: 20 nutation periods.", "120 s"
+        "End of the planning time, s. Default: 20 nutation periods.", "120 s"
     )
     earliest: Time = Field("Earliest start of a pulse, s; default 0.", "5 s", default=0.0)
     gap: Time = Field("Least time between two pulses, s; default 0.", "0.5 s", default=0.0)
     tick: PositiveTime | None = Field(
-        "Resolution of commanded starts and on-times, s; default: none.", "1 ms"
+        "Resolution of commanded starts and on-times, s. Default: none.", "1 ms"
     )
-    max_pulses: Count | None = Field("Largest number of pulses; default: no limit.", 8)
+    max_pulses: Count | None = Field("Largest number of pulses. Default: no limit.", 8)
     blackout: Annotated[list[Window], _ListOf("[begin, end]")] = Field(
         "Windows [begin, end], s, in which no pulse may be on.", [["10 s", "20 s"]], default=[]
     )
@@ -941,26 +929,26 @@ class DisturbanceSection(Section):
 
     name: Name | None = Field("Name of the disturbance, for reports.", "leak")
     kind: Literal["constant", "rotating", "axial"] | None = Field(
-        "constant: fixed in the body; rotating: turns about axis 3; axial: about axis 3 only. "
-        "Default: rotating where rate or fixed_in is given, else constant.",
+        "constant: fixed in the body. rotating: turns about principal axis 3. axial: along the "
+        "third axis of the file. Default: rotating if rate or fixed_in is given, else constant.",
         "rotating",
     )
     torque: DisturbingTorques = Field(
-        "Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 "
-        "= 0; "
-        "of an axial one a single torque.",
+        "Torque [M1, M2, M3] about the centre of mass, N m. A rotating one: its value at t = 0, "
+        "with M3 = 0. An axial one: a single number.",
         ["20 mN m", 0, 0],
     )
     rate: Rate | None = Field(
-        "Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.",
+        ("Rate at which a rotating torque turns about axis 3, as seen in the body, signed, rad/s."),
         "-3 rad/s",
     )
     fixed_in: Literal["inertial"] | None = Field(
-        "inertial: a rotating torque nearly fixed in space; its rate is minus the spin.", "inertial"
+        ("inertial: a rotating torque that is nearly fixed in space. Its rate is minus the spin."),
+        "inertial",
     )
     from_: Time | None = Field("Time after t = 0 at which it begins, s; default 0.", "10 s")
     until: PositiveTime | None = Field(
-        "Time after t = 0 at which it is over, s; default: it lasts.", "45 s"
+        "Time after t = 0 at which it ends, s. Default: it does not end.", "45 s"
     )
 
 
@@ -971,7 +959,7 @@ class DissipationSection(Section):
         "Time, s, in which the nutation angle grows or decays by the factor e.", "600 s"
     )
     nutation: Literal["grows", "decays"] | None = Field(
-        "What it does; default by shape: it grows where A > C, and decays where A < C.", "grows"
+        "What the nutation does. Default by shape: it grows if A > C, and decays if A < C.", "grows"
     )
 
 
@@ -985,29 +973,27 @@ class SpacecraftFile(Section):
     }
 
     name: Name = Field("Name of the spacecraft.", "Sounder-1")
-    mass: Mass | None = Field("Mass, kg; without it no velocity change is worked out.", "250 kg")
+    mass: Mass | None = Field("Mass, kg. Without it no velocity change is computed.", "250 kg")
     inertia: InertiaSection = Field(
         "Moments of inertia: A and C, or tensor, kg m².", {"A": "120 kg m^2", "C": "80 kg m^2"}
     )
     center_of_mass: Position | None = Field(
-        (
-            "Center of mass, in the frame of the positions of thrusters and sensor, m; default: "
-            "they count from it."
-        ),
+        "Center of mass, m, in the frame of the positions of thrusters and sensor. Default: "
+        "positions count from it.",
         [0, "2 mm", "0.4 m"],
     )
     center_of_mass_per_kg: Travel | None = Field(
-        "How far each kg of propellant used moves the center of mass, m/kg; default: it stays.",
+        "Move of the center of mass for each kg of propellant used, m/kg. Default: it stays.",
         [0, 0, "-1 mm/kg"],
     )
     wheel: WheelSection | None = Field(
         "A momentum wheel or a despun platform.", {"momentum": "40 N m s"}
     )
     omega0: Rates | None = Field(
-        "Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.", [0.12, "2 deg/s", "30 rpm"]
+        "Body rates [ω1, ω2, ω3] at t = 0, rad/s. Or give state.", [0.12, "2 deg/s", "30 rpm"]
     )
     state: StateSection | None = Field(
-        "Motion at t = 0 by spin and nutation; or instead omega0.",
+        "Motion at t = 0 by spin and nutation. Or give omega0.",
         {"spin": "30 rpm", "nutation": "5 deg"},
     )
     attitude: AttitudeSection | None = Field(
@@ -1027,50 +1013,46 @@ class SpacecraftFile(Section):
         default=[],
     )
     channels: Annotated[dict[Name, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
-        "Names of thrusters that fire together; without it each thruster is a channel of its own.",
+        "Names of thrusters that fire together. Without it each thruster is a channel of its own.",
         {"+M1": ["T1", "T2"]},
     )
     steerable: SteerableSection | None = Field(
-        "A torquer for any transverse axis.", {"torque": "20 N m"}
+        "A torquer that can push about any transverse axis.", {"torque": "20 N m"}
     )
     valve: ValveSection | None = Field(
-        "How the thrust of every thruster that does not say it itself follows a command.",
+        "How thrust follows a command, for all thrusters that have no valve of their own.",
         {"open_delay": "8 ms", "close_delay": "12 ms", "rise_time": "5 ms", "fall_time": "10 ms"},
     )
     cold: ColdSection | None = Field(
-        "Cold nozzles, which make the first pulses of each channel weaker.",
+        "Cold nozzles: the first pulses of each channel are weaker.",
         {"first": "90 %", "pulses": 4},
     )
     tank: TankSection | None = Field(
-        "The tank in blowdown, whose pressure the thrust goes with.",
+        "A blowdown tank: the thrust depends on its pressure.",
         {"propellant": "30 kg", "pressure": "22 bar", "final_pressure": "8 bar"},
     )
     disturbances: list[DisturbanceSection] = Field(
         "Disturbance torques.", [{"name": "leak", "torque": ["20 mN m", 0, 0]}], default=[]
     )
     dissipation: DissipationSection | None = Field(
-        "Energy dissipation; without it the body is rigid.",
+        "Energy dissipation. Without it the body is rigid.",
         {"time_constant": "600 s", "nutation": "grows"},
     )
     requirement: RequirementSection | None = Field(
         "What a plan must reach.", {"nutation": "0.5 deg"}
     )
-    limits: LimitsSection | None = Field(
-        "Limits that every schedule respects.", {"horizon": "120 s"}
-    )
+    limits: LimitsSection | None = Field("Limits that each schedule keeps.", {"horizon": "120 s"})
     goal: GoalSection | None = Field(
-        "Where the spin axis and the spin are to end.", {"tilt": "10 deg", "azimuth": "45 deg"}
+        "Where spin axis and spin must end.", {"tilt": "10 deg", "azimuth": "45 deg"}
     )
     sun: Annotated[InTheSky, _OrWord("epoch")] | None = Field(
-        (
-            "Right ascension and declination of the Sun in the attitude's frame, rad; "
-            "epoch computes them."
-        ),
+        "Right ascension and declination of the Sun in the frame of attitude, rad. With epoch "
+        "nutdamp computes them.",
         "epoch",
         ["120 deg", "10 deg"],
     )
     keep: list[KeepSection] = Field(
-        "Cones that the spin axis keeps on its way to a target.",
+        "Cones that the spin axis must keep on its way to a target.",
         [{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}],
         default=[],
     )
@@ -1078,7 +1060,7 @@ class SpacecraftFile(Section):
         "The sensor whose pulse fires command blocks.", {"azimuth": "35 deg"}
     )
     commands: CommandsSection | None = Field(
-        "Command blocks: pulses fired by the Sun pulse.",
+        "Command blocks: pulses that the Sun pulse fires.",
         {
             "delay_step": "2 ms",
             "delay_max": "1.9 s",
@@ -1090,5 +1072,6 @@ class SpacecraftFile(Section):
         {"sensor": {"kind": "gyro", "rate": "100 Hz"}, "start": "0.5 deg", "stop": "0.05 deg"},
     )
     dispersions: DispersionsSection | None = Field(
-        "How far the real spacecraft may be off what the file says.", {"A": {"normal": "2 %"}}
+        "How much the real spacecraft may differ from the values of the file.",
+        {"A": {"normal": "2 %"}},
     )

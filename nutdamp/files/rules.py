@@ -44,7 +44,7 @@ MOUNTING = ".position .direction .force"
 COMPONENT = "expected at least one component other than 0"
 TURNING = "only a rotating torque turns"
 EVERYWHERE = "a gyro measures the same everywhere"
-RESERVED = f"the name {STEERABLE!r} is kept for the steerable torquer; take another"
+RESERVED = f"the name {STEERABLE!r} is reserved for the steerable torquer; use another"
 
 RULES = (
     # Path; kind of rule; other keys (those beside it begin with a dot; | is or; =value only with
@@ -77,7 +77,7 @@ RULES = (
         "orbit",
         "needs",
         "attitude.epoch attitude.frame",
-        ": the moment of the position and the axes that it is in",
+        ", which give time and axes of the position",
     ),
     (
         "orbit.position",
@@ -88,7 +88,7 @@ RULES = (
     ("keep", "once", "name", "take another"),
     ("keep.*.direction", "needs", "attitude", POINTING),
     ("keep.*.direction=sun", "needs", "sun", SUN),
-    ("keep.*.min", "missing", ".max", "give min, max or both, else the cone has no effect"),
+    ("keep.*.min", "missing", ".max", "give min, max or both; without them the cone has no effect"),
     ("keep.*.min", "at most", ".max", "angle"),
     (
         "goal.tilt",
@@ -112,7 +112,7 @@ RULES = (
         "requirement.probability",
         "needs",
         ".nutation|.momentum_shift|.pointing|.spin",
-        ", of which it is the share",
+        ": this is a share of it",
     ),
     (
         "requirement.pointing",
@@ -138,7 +138,7 @@ RULES = (
     ("thrusters.*.direction", "completes", ".position .force", "cannot give a torque"),
     ("thrusters.*.force", "completes", ".position .direction", "cannot give a torque"),
     ("thrusters.*.direction", "not zero", "number", "expected a direction, such as [1, 0, 0]"),
-    ("thrusters.*.lever_arm", "beside", ".position", "leave it out, position gives the arm"),
+    ("thrusters.*.lever_arm", "beside", ".position", "leave it out: position gives the arm"),
     ("thrusters.*.min_on_time", "at most", ".max_on_time", "time"),
     ("thrusters.*.impulse_bit", "beside", ".valve", KEEP),
     ("thrusters.*.impulse_bit", "needs", ".force|.lever_arm", ", which tells the thrust"),
@@ -155,8 +155,8 @@ RULES = (
     ("loop", "needs", "thrusters", ", which it fires"),
     ("loop.stop", "below", ".start", "angle"),
     ("loop.law=bang", "needs", ".on_time", ", the length of its pulses"),
-    ("loop.on_time", "beside", ".law=one-pulse", "one-pulse fires for as long as it takes"),
-    ("loop.sensor.kind=accelerometer", "needs", ".rate", ": of samples a sine is made"),
+    ("loop.on_time", "beside", ".law=one-pulse", "one-pulse fires as long as needed"),
+    ("loop.sensor.kind=accelerometer", "needs", ".rate", ": a sine is fitted to its samples"),
     ("loop.sensor.kind=accelerometer", "needs", ".position", ", from the centre of mass"),
     ("loop.sensor.position", "beside", ".kind=gyro", EVERYWHERE),
     ("loop.sensor.axis", "beside", ".kind=gyro", EVERYWHERE),
@@ -318,7 +318,7 @@ def _sensed(facts: Facts, path: KeyPath, *_: str) -> Iterator[Finding]:
         return
     quantity, units = OTHER_SENSOR[kind]
     if facts.number(quantity, *path) is not None:
-        yield Finding(path, f"{shown(text)} is not in a unit of {units}")
+        yield Finding(path, f"{shown(text)} does not have a unit of {units}")
 
 
 KINDS_OF_RULES: dict[str, Callable[[Facts, KeyPath, str, str], Iterator[Finding]]] = {
@@ -399,12 +399,12 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
 def _motion(facts: Facts) -> Iterator[Finding]:
     path, stated = facts.stated_spin
     if stated is not None and abs(stated) < SMALLEST and not facts.wheel:
-        cure = "expected a rate about axis 3, or a wheel; nothing nutates without"
+        cure = "expected a rate about axis 3, or a wheel; without both there is no nutation"
         yield Finding(path, f"the spin is zero; {cure}")
     spin, inertia = facts.spin, facts.inertia
     final = facts.number("rate", "goal", "spin")
     if final is not None and spin is not None and final * spin < 0.0:
-        problem = "of the other sign than the spin at t = 0; the spin cannot be reversed"
+        problem = "its sign differs from the spin at t = 0; the spin cannot be reversed"
         yield Finding(("goal", "spin"), problem)
     if spin is None or inertia is None or not inertia.wheel:
         return
@@ -412,12 +412,12 @@ def _motion(facts: Facts) -> Iterator[Finding]:
     path = ("wheel", "momentum")
     if abs(axial) <= CANCELLED * abs(inertia.wheel):
         problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s"
-        yield Finding(path, f"{problem}: without momentum nothing nutates")
+        yield Finding(path, f"{problem}: without momentum there is no nutation")
     elif axial * spin < 0.0 and facts.has("sun_sensor"):
-        problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse"
-        yield Finding(path, f"{problem} are not planned then; leave sun_sensor out")
+        problem = "points the angular momentum against the spin: blocks fired from the Sun pulse"
+        yield Finding(path, f"{problem} are not planned then; leave out sun_sensor")
     if facts.has("dissipation") and not facts.has("dissipation", "nutation"):
-        problem = "missing; with a wheel the place of the loss decides: give grows or decays"
+        problem = "missing; with a wheel it depends on where energy is lost: give grows or decays"
         yield Finding(("dissipation", "nutation"), problem)
 
 
@@ -467,7 +467,7 @@ def _tank(facts: Facts) -> Iterator[Finding]:
     for path in facts.below("thrusters") if facts.has("tank") else ():
         for key, other in (("isp", ("tank", "isp")), ("lever_arm", (*path, "force"))):
             if not facts.has(*path, key) and not facts.has(*other):
-                yield Finding((*path, key), "missing; by it tank knows the propellant used")
+                yield Finding((*path, key), "missing; the tank needs it for the propellant used")
     # Once all propellant is used, the moments must be those of a body.
     path = ("tank", "inertia_per_kg")
     propellant = facts.number("mass", "tank", "propellant")
@@ -479,7 +479,7 @@ def _tank(facts: Facts) -> Iterator[Finding]:
         return
     fault = moments_fault(np.asarray(facts.principal[0]) - propellant * rows)
     if fault is not None:
-        yield Finding(path, f"once {propellant:g} kg are used it leaves {fault}")
+        yield Finding(path, f"after {propellant:g} kg are used it leaves {fault}")
 
 
 def _dispersions(facts: Facts) -> Iterator[Finding]:
@@ -498,7 +498,9 @@ def _dispersions(facts: Facts) -> Iterator[Finding]:
                 for size in DISTRIBUTIONS:
                     if facts.number("force", *place, size) is not None:
                         problem = f"needs the thrust of {shown(name)}, which is not known"
-                        yield Finding((*place, size), f"{problem}; give its lever_arm, or a %")
+                        yield Finding(
+                            (*place, size), f"{problem}; give its lever_arm, or a tolerance in %"
+                        )
 
 
 SAMPLES = 4.0  # samples a nutation period without which the phase of the nutation is hardly seen
@@ -569,7 +571,7 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
                 cure = cure_of(name, correlated)
                 faults.append(Finding((*path, row, place), f"{problem}; {cure}"))
             elif name in fixed:
-                problem = f"{shown(name)} is a fixed offset (bias), which does not vary"
+                problem = f"{shown(name)} is a fixed offset (bias) and does not vary"
                 faults.append(Finding((*path, row, place), problem))
         if first == second:
             problem = f"{shown(first)} again; expected two different inputs"
@@ -582,7 +584,7 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     for group in () if faults else grouped(pairs):
         if not positive_definite(group):
             problem = f"not positive definite for {', '.join(group.names)}"
-            why = "no numbers have these correlations; pairs that are not given count as 0"
+            why = "these correlations contradict each other; pairs that are not given count as 0"
             yield Finding(path, f"{problem}: {why}")
 
 

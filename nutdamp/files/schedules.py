@@ -80,7 +80,7 @@ def read_blocks(
             choice.sort(key=lambda column: column != "delay_deg")
         columns[name] = next((each for each in choice if each in table.header), f"{name}_s")
         if columns[name].endswith("_counts") and commands is None:
-            problem = f"the spacecraft file has no commands to count the {name} in"
+            problem = f"the spacecraft file has no commands, which give the steps of {name}"
             table.fault(1, columns[name], f"{problem}; expected the column {name}_s")
     table.expect("channel", "first_sun_pulse", *columns.values(), "count")
     blocks = {row.line: _block(row, spacecraft, columns) for row in table.rows}
@@ -289,7 +289,7 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
     propellant = None
     torquer = spacecraft.torquer
     if channel is not None:
-        flown = "flown as an ideal impulse, its propellant is unknown"
+        flown = "it is flown as an ideal impulse, with unknown propellant"
         row.warn(f"ideal {name}", f"{shown(name)} has an on-time of 0: {flown}")
     elif name != STEERABLE or torquer is None:
         names = ", ".join(map(shown, channels)) or STEERABLE

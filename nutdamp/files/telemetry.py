@@ -45,7 +45,7 @@ def record_of(history: Contents, spacecraft: Spacecraft, schedule: Schedule) -> 
     """
     start = spacecraft.attitude
     if len(history.times) < 2 or history.frame is None:
-        raise BadRequest("the message has no attitudes at several times: expected a history")
+        raise BadRequest("the message has no history of attitudes: expected several records")
     if start is None or start.epoch is None:
         raise BadRequest(
             "the spacecraft file has no attitude.epoch to count the times of a history from"
@@ -158,7 +158,7 @@ def _read_samples(
     _expect_time(table)
     header = table.header
     if not table.faults and not {*MEASURED} & {*header}:
-        table.fault(1, "", f"no column of samples; expected some of {', '.join(MEASURED)}")
+        table.fault(1, "", f"no column of samples; expected one or more of {', '.join(MEASURED)}")
     for name, other in TWICE.items():
         if name in header and other in header:
             table.fault(1, name, f"given twice, also as {other}; remove one of them")
@@ -166,7 +166,7 @@ def _read_samples(
         present = [name for name in group if name in header]
         for name in group if present else ():
             if name not in header:
-                table.fault(1, name, f"the column is missing beside {present[0]}")
+                table.fault(1, name, f"the column is missing; {present[0]} needs it")
     if TOWARDS[0] in header and CROSSED[0] not in header:
         table.fault(1, CROSSED[0], f"the column is missing beside {TOWARDS[0]}")
     if CROSSED[0] in header and TOWARDS[0] not in header and spacecraft.sun is None:
@@ -181,7 +181,7 @@ def _read_samples(
         if 0.0 < out.mean() <= BROKEN:
             signals[name][out] = math.nan
             table.warned.append(
-                f"{path}: {name}: {out.sum()} samples that no motion shows are left out"
+                f"{path}: {name}: {out.sum()} samples are left out, because no motion can give them"
             )
     _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
@@ -219,7 +219,7 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
             row.fault(column, str(reason))
             continue
         if time is not None and moments and time <= moments[-1]:
-            text = f"{row[column]} does not rise: the sample before is at {moments[-1]:.9g} s"
+            text = f"{row[column]} is not after the sample before, at {moments[-1]:.9g} s"
             row.fault(column, text + (JUMPS if TRACK[-1] in table.header else ""))
         moments += [] if time is None else [time]
     table.check()

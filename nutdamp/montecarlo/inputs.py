@@ -48,7 +48,7 @@ TENSOR = {
 }
 """Inputs of the inertia tensor, and the row and column of each."""
 
-KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
+KNOWN_BY_TORQUE = "the file gives only its torque, not position and direction of its force"
 
 SCHEDULE_IDLE = "the schedule does not fire"
 
@@ -223,7 +223,7 @@ def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
         names = [f"Sun pulse {number}" for number in dict.fromkeys(schedule.fired_with)]
         yield _Row("sun_sensor.jitter", jitter, names, 0.0, "s")
     yield _Row("attitude", requested.attitude, ["attitude x", "attitude y"], 0.0, "rad")
-    idle = "a schedule is fired whatever a sensor shows: --loop flies the loop"
+    idle = "a schedule does not use the sensor; --loop flies the loop"
     for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
         yield _Row(key, getattr(requested, key), [key.replace("_", " ")], 0.0, "", idle)
 

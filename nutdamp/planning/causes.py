@@ -78,12 +78,12 @@ def _broken(breach: Breach) -> str:
     start, on_time = pulse.loaded
     on = f"is on for {on_time:.6g} s"
     early = (
-        f"comes less than {bound} after the one before"
+        f"begins less than {bound} after the one before"
         if breach.bound
         else "starts before the one before ends"
     )
     how = {
-        Limit.RESOLUTION: f"is too short for its time, where times are {breach.by:.2g} s apart",
+        Limit.RESOLUTION: f"is too short: at its time numbers are {breach.by:.2g} s apart",
         Limit.EARLIEST: f"starts before {bound}",
         Limit.HORIZON: f"ends after the horizon of {bound}",
         Limit.GAP: early,

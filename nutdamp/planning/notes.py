@@ -21,6 +21,7 @@ from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import WASTEFUL, worths
+from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 
@@ -45,6 +46,9 @@ def spacecraft_notes(spacecraft: Spacecraft) -> Iterator[Note]:
     if not damped.met(tilt):
         limit = math.degrees(damped.limit)
         yield note("principal-axis-off", tilt_deg=math.degrees(tilt), limit_deg=limit)
+    commands = spacecraft.commands
+    if commands is not None and commands.per_turn > 1 and commands.delay_is != ANGLE:
+        yield note("delays-in-time", per_turn=commands.per_turn)
     channels = [channel for channel in spacecraft.channels if channel.damps]
     pushes = np.array([channel.transverse / abs(channel.transverse) for channel in channels])
     if len(channels) > 1 and np.outer(pushes, pushes.conj()).real.min() >= math.cos(ALIKE):
@@ -238,20 +242,17 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
         again = requirements.to_required(flight.spacecraft, left, growing=True)
         if again and left > TELLING:
             after = flight.schedule.end if flight.until is None else flight.until
-            figures_ = {
+            figures_: dict[str, Value] = {
                 "after_s": after,
                 "left_deg": math.degrees(left),
                 "limit_deg": limit,
                 "lasting_s": again,
             }
-            if verdict.cases is None:
-                yield note("grows-again", **figures_)
-            else:
-                yield note(
-                    "grows-again-in-cases",
-                    share=f"{100.0 * verdict.cases.probability:.10g}",
-                    **figures_,
-                )
+            if verdict.cases is not None:
+                figures_["share"] = f"{100.0 * verdict.cases.probability:.10g}"
+            yield note(
+                "grows-again" if verdict.cases is None else "grows-again-in-cases", **figures_
+            )
     limited = spacecraft.goal.axis is not None or _limit_of(spacecraft, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note(
@@ -275,14 +276,14 @@ def _spin_change(plan: Plan, flight: Flight) -> Iterator[Note]:
     if spacecraft.goal.spin is not None or abs(after - before) <= resolution:
         return
     pulses = flight.schedule
-    causes = list[str]()
-    explained = 0.0
-    for name in dict.fromkeys(pulse.channel for pulse in pulses):
-        impulse = math.fsum(float(pulse.impulse[2]) for pulse in pulses if pulse.channel == name)
-        explained += RPM * impulse / spacecraft.inertia.C
-        if impulse:
-            causes.append(f"{name} {RPM * impulse / spacecraft.inertia.C:+.3g} rpm")
-    if abs(after - before - explained) > resolution:
+    changes = {
+        name: RPM
+        * math.fsum(float(pulse.impulse[2]) for pulse in pulses if pulse.channel == name)
+        / spacecraft.inertia.C
+        for name in dict.fromkeys(pulse.channel for pulse in pulses)
+    }
+    causes = [f"{name} {change:+.3g} rpm" for name, change in changes.items() if change]
+    if abs(after - before - sum(changes.values())) > resolution:
         others = {
             "dissipation": spacecraft.growth != 0.0,
             "disturbances": bool(spacecraft.disturbances),
@@ -363,16 +364,9 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
         if (
             chosen.kept is not False and cases is not None and cases.enough is False
         ):  # else the cones are the reason
-            missing = (
-                (plan, each) for plan, each in compared.cases.items() if each.enough is False
-            )
-            schemes = ", ".join(plan.scheme for plan, _ in missing)
-            searched = compared.preferred is not None
-            share = 100.0 * cases.probability
             yield note(
-                "too-few-cases-robust" if searched else "too-few-cases",
-                schemes=schemes,
-                required_share=share,
+                "too-few-cases" if compared.preferred is None else "too-few-cases-robust",
+                required_share=100.0 * cases.probability,
             )
         return
     from nutdamp.flight.cones import at_start
@@ -457,15 +451,13 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         if any(plan.feasible for plan in compared.plans):
             yield note("no-blocks")
             return
-        waiting = requirements.only_nutation(spacecraft)
         damped = (
             requirements.to_required(spacecraft, spacecraft.nutation, growing=False)
-            if waiting
+            if requirements.only_nutation(spacecraft)
             else None
         )
         yield note("none-feasible") if damped is None else note("none-needed-from", from_s=damped)
-        able = any(channel.damps for channel in spacecraft.channels)
-        able = able and (
+        able = any(channel.damps for channel in spacecraft.channels) and (
             spacecraft.goal.spin is None or any(channel.axial for channel in spacecraft.channels)
         )
         if able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}:

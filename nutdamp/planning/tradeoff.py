@@ -113,7 +113,7 @@ def certificate(plan: Plan) -> Certificate:
     """Certificate of a plan of optimal; raises BadRequest where there is none, with the reason."""
     known = plan.pulses.bounds
     if plan.scheme != OPTIMAL.name:
-        raise BadRequest(f"a certificate is of a plan of {OPTIMAL.name}, not of {plan.scheme}")
+        raise BadRequest(f"a certificate needs a plan of {OPTIMAL.name}, not of {plan.scheme}")
     if not plan.feasible or known is None or known.first_order is None:
         raise BadRequest(
             f"{OPTIMAL.name} has no least cost to prove here: "
@@ -137,8 +137,7 @@ def certificate(plan: Plan) -> Certificate:
         known.first_order
     ):
         raise BadRequest(
-            "the plan is put together from several programs, and none of them proves what all of "
-            "it costs"
+            "the plan combines several linear programs, and none of them bounds the cost of all"
         )
     return Certificate(plan, problem, program, solution.burns, proof)
 

@@ -288,8 +288,8 @@ def fire_all(
             if start < over[flight] - 1e-9:
                 text = (
                     f"block {index + 1}, Sun pulse {number}: a pulse of {block.channel} would "
-                    f"begin at {start:.6g} s, and the one before is over at {over[flight]:.6g} s; "
-                    "give them delays or Sun pulses farther apart"
+                    f"begin at {start:.6g} s, before the one before ends at {over[flight]:.6g} s; "
+                    "change their delays or Sun pulses"
                 )
                 sun_pulses.fail(flight, Infeasible(text))
         spent = np.zeros(count)
@@ -300,7 +300,7 @@ def fire_all(
             pulses[flight].append(pulse.moved(float(starts[flight])))
         over[list(given)] = clock.over[list(given)]
         if len(sun_pulses.seen) > ALWAYS and work.exhausted():
-            sun_pulses.end(Infeasible("the budget of work is spent before its last pulse"))
+            sun_pulses.end(Infeasible("the budget of work was used up before its last pulse"))
     for flight, supply in enumerate(supplies):
         if sun_pulses.failures[flight] is None and supply.shortage is not None:
             sun_pulses.fail(flight, Infeasible(supply.shortage))
@@ -453,7 +453,9 @@ class BlockModel:
         # About the Sun: longitudes count from the meridian of H at t = 0, right-handed.
         sine = float(np.linalg.norm(np.cross(sun, start)))
         if sine < 1e-6:
-            raise Infeasible("the spin axis points to the Sun or away from it: it has no Sun pulse")
+            raise Infeasible(
+                "the spin axis points to the Sun or away from it, so there is no Sun pulse"
+            )
         self._frame = np.array(
             [np.cross(np.cross(sun, start), sun) / sine, np.cross(sun, start) / sine, sun]
         )

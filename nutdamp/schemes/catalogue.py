@@ -183,7 +183,7 @@ class OptimalOptions(SchemeOptions):
             raise SenselessOption("shift", as_given(self.shift), problem)
 
     def settled(self, *, keeps_axis: bool) -> Self:
-        """Copy with the default freedom of H; no ``shift`` at all is none."""
+        """Copy with the default freedom of H; a ``shift`` of 0 becomes None."""
         if self.shift is not None:
             return dataclasses.replace(self, free_axis=False, shift=self.shift or None)
         return (

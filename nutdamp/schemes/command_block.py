@@ -131,7 +131,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
             "sun_sensor and commands"
         )
     if options.per_turn > 2:
-        raise Infeasible("blocks fire two pulses a turn at most: give --per-turn 1 or 2")
+        raise Infeasible("blocks fire at most two pulses a turn: give --per-turn 1 or 2")
     tick = spacecraft.limits.tick
     commands = replace(commands, per_turn=max(options.per_turn, commands.per_turn))
     spacecraft = replace(with_limits(spacecraft, tick=None), commands=commands)
@@ -175,7 +175,7 @@ def expect_spin(spacecraft: Spacecraft, spin: float, *, alone: bool) -> None:
     change = spin - spacecraft.spin
     if spin * spacecraft.spin <= 0.0:
         raise Infeasible(
-            "cannot reverse the spin: where the body does not turn there is no Sun pulse"
+            "blocks cannot reverse the spin: a body that does not spin gives no Sun pulse"
         )
     if requirements.spins_at(spacecraft, spin):
         return
@@ -201,21 +201,18 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     channels = [channel for channel in able if commandable_widths(commands, channel).size]
     if not channels:
         raise Infeasible(
-            "no width that can be commanded (commands.width) is one that a channel allows"
+            "no channel allows a width of commands.width; check its min_on_time and max_on_time"
         )
     search = BlockSearch(spacecraft, channels, most or BLOCKS)
     search.run()
     flights = search.flights
     if not flights.of:
         outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
-        why = (
-            f"no block that can be commanded ends within the horizon{outside}; "
-            "a longer limits.horizon may help"
-        )
+        why = f"no block ends within the horizon{outside}; a longer limits.horizon may help"
         if flights.why is not None:
             why = f"the best block in closed form cannot be flown: {flights.why}"
         elif work.exhausted():
-            why = "the budget of work is spent before a block is found"
+            why = "the budget of work was used up before a block was found"
         raise Infeasible(why)
     chosen = flights.chosen()
     notes = [scope_note(search, chosen)]

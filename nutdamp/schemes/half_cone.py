@@ -98,12 +98,12 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         )
     if fewest >= MOST_CONES:
         raise Infeasible(
-            f"one pulse turns H by {turn_of(at_leg, reach)} at most, so more than {MOST_CONES} "
-            "half cones would be needed; rhumb-line takes many small pulses"
+            f"one pulse turns H by {turn_of(at_leg, reach)} at most, so the target takes "
+            f"more than {MOST_CONES} half cones; use rhumb-line, with many small pulses"
         )
     raise TooShort(
-        f"{fewest} half cones are needed at least, each half a nutation turn long; "
-        f"the {horizon:.4g} s up to limits.horizon do not suffice for them"
+        f"at least {fewest} half cones are needed, each half a nutation turn long; the "
+        f"{horizon:.4g} s up to limits.horizon are too short"
     )
 
 
@@ -179,10 +179,8 @@ def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
     if not math.isfinite(least):
         names = ", ".join(channel.name for channel in channels)
         raise Infeasible(
-            f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse "
-            "that its on-times and "
-            f"the blackout windows allow in the {span:.4g} s left; --cones with another number, "
-            "or rhumb-line, can help"
+            f"{cones} half cones remain, and in the {span:.4g} s left no channel ({names}) "
+            "has an allowed pulse in phase; try another --cones, or rhumb-line"
         )
     near = least + WORTH_WAITING * nominal
     pulses = [

@@ -260,16 +260,13 @@ class SteerablePair:
                 needed = float(np.linalg.norm(middle - self.momentum, axis=1).min())
             if needed > once:
                 return (
-                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, "
-                    "the torque being fixed "
-                    f"in the body), and {turn_of(self.spacecraft, needed)} are needed at once; "
-                    "half-cone with more "
-                    "cones or rhumb-line take less"
+                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, for "
+                    f"a torque fixed in the body), and {turn_of(self.spacecraft, needed)} are "
+                    "needed at once; use half-cone with more cones, or rhumb-line"
                 )
         return (
-            f"the pulses (half cones: {cones}) find no room within the {horizon:.4g} s up to "
-            "limits.horizon, the gap "
-            "and the blackout windows"
+            f"the pulses (half cones: {cones}) do not fit into the {horizon:.4g} s up to "
+            "limits.horizon with the gap and the blackout windows"
         )
 
 
@@ -347,21 +344,19 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Schedule, if it keeps the limits and comes near the target."""
     if not keeps_limits(spacecraft, schedule.pulses):
-        raise Infeasible(
-            "with commands on the ticks of limits.tick the two pulses touch another limit"
-        )
+        raise Infeasible("rounded to limits.tick, the two pulses break another limit")
     if correction.left(spacecraft, schedule) <= tolerable(spacecraft):
         return schedule
     widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in schedule), default=0.0)
     if widest == 0.0:
         raise Infeasible(
-            "placed for free motion of a symmetric body, two impulses could not be corrected to "
-            "end on the target"
+            "two impulses planned for the free motion of a symmetric body could not be "
+            "corrected to end on the target"
         )
     raise Infeasible(
-        f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) "
-        "do not end on the "
-        "target; half-cone with more cones or rhumb-line take smaller ones"
+        f"the two pulses are too long (the body turns by {math.degrees(widest):.3g}° "
+        "during one) and do not end on the target; use half-cone with more cones, or "
+        "rhumb-line"
     )
 
 
@@ -509,21 +504,18 @@ class _PairSearch:
         )
         if 2.0 * strongest < self.floor:
             return (
-                f"one pulse turns H by {turn_of(self.spacecraft, strongest)} at most, "
-                "and two together would have to "
-                f"by {turn_of(self.spacecraft, self.floor)}; half-cone with more cones or "
-                "rhumb-line take smaller ones"
+                f"one pulse turns H by {turn_of(self.spacecraft, strongest)} at most, and the "
+                f"two must turn it by {turn_of(self.spacecraft, self.floor)}; use half-cone "
+                "with more cones, or rhumb-line"
             )
         if self.within_reach:
             return (
-                f"pairs of the channels ({names}) acquire the target, but not within on-times, "
-                "gap, blackout windows "
-                f"and the {self.windows.horizon:.4g} s up to limits.horizon"
+                f"pairs of the channels ({names}) can reach the target, but not with the "
+                f"on-times, gap, blackout windows and {self.windows.horizon:.4g} s up to "
+                "limits.horizon"
             )
         return (
-            f"no two of the channels ({names}) push in the right directions, one after the other, "
-            "in the "
-            f"{self.windows.horizon:.4g} s up to limits.horizon; a longer horizon, "
-            "a steerable torquer or rhumb-line "
-            "can help"
+            f"no pair of the channels ({names}) pushes in the right directions within the "
+            f"{self.windows.horizon:.4g} s up to limits.horizon; try a longer horizon, a "
+            "steerable torquer or rhumb-line"
         )

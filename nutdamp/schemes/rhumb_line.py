@@ -100,7 +100,7 @@ class Train:
             channels = usable(at_leg)
             count = options.per_turn
             if not channels:
-                raise Infeasible("once the nutation is taken out no time is left for the turn")
+                raise Infeasible("no time is left for the turn after the nutation is damped")
             self.channels = [
                 min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))
             ]
@@ -115,8 +115,8 @@ class Train:
                 if max(off) < 0.2:
                     raise Infeasible(
                         f"{count} pulses a spin turn need {count} channels of different "
-                        "directions, for each passes "
-                        f"the phase once a turn; there are {len(self.channels)}"
+                        f"directions, because each passes the phase once a turn; "
+                        f"there are {len(self.channels)}"
                     )
                 self.channels.append(channels[off.index(max(off))])
             self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(
@@ -138,10 +138,7 @@ class Train:
         if given is not None:
             name = f"an on-time of {given:.4g} s"
             if self.ideal:
-                raise Infeasible(
-                    "an on-time is for pulses that last: ideal impulses have none; "
-                    "give the torquer a torque"
-                )
+                raise Infeasible("ideal impulses have no on-time; give the torquer a torque")
             if not self.shortest <= given <= self.longest:
                 allowed = span(self.shortest, self.longest, "s")
                 raise Infeasible(f"{name} is outside what the channels allow: {allowed}")
@@ -152,9 +149,8 @@ class Train:
                 )
         if not self.ideal and self.on_time > 0.5 * self.turn:
             raise Infeasible(
-                f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s), "
-                "after which a torque fixed in the "
-                "body undoes its work"
+                f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s): after that a "
+                "torque fixed in the body turns H back"
             )
         self.ahead, self.way = precession.course(
             at_leg.momentum, at_leg.target_axis, at_leg.goal.sun
@@ -368,18 +364,15 @@ class Train:
         least = math.degrees(float(self.left[fewest - 1 : most].min()) * self.way / most)
         if abs(ratio - round(ratio)) * most >= 1.0:
             return Infeasible(
-                f"of {fewest} to {most} pulses, as many as limits and on-times allow, "
-                "no number brings the nutation "
-                f"back to nothing: {least:.3g}° would be left; "
-                "a longer horizon or another --per-turn can help"
+                f"no train of {fewest} to {most} pulses, as limits and on-times allow, ends "
+                f"without nutation: at least {least:.3g}° would be left; try a longer horizon "
+                "or another --per-turn"
             )
         return Infeasible(
-            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after "
-            "pulse meets the "
-            "nutation in nearly the same phase: even the best train, "
-            f"of {fewest} to {most} pulses, "
-            f"would leave {least:.3g}°; another --per-turn, a longer horizon, "
-            "half-cone or two-pulse can help"
+            f"C/(A × pulses per turn) = {ratio:.4g} is near a whole number, so the pulses "
+            "meet the nutation in nearly the same phase and build it up. The best train of "
+            f"{fewest} to {most} pulses would leave {least:.3g}°; try another --per-turn, a "
+            "longer horizon, half-cone or two-pulse"
         )
 
     def _too_few(self, needed: int) -> Infeasible:
@@ -388,19 +381,19 @@ class Train:
         moments = len(self.left)
         if most is not None and most < needed:
             return Infeasible(
-                f"a train to the target takes {needed} pulses at least, "
-                f"and limits.max_pulses leaves {most} for it"
+                f"a train to the target takes at least {needed} pulses, and limits.max_pulses "
+                f"leaves {most} for it"
             )
         if needed <= moments:
             return Infeasible(
-                "so many of the shortest pulses turn H beyond the target; lower min_on_time, "
-                "or take two-pulse"
+                "this many of the shortest pulses turn H beyond the target; lower min_on_time, "
+                "or use two-pulse"
             )
         turns = needed / self.options.per_turn * self.turn
         return TooShort(
-            f"a train to the target takes {needed} pulses, about {turns:.4g} s, "
-            "and the limits leave moments for "
-            f"{moments}; longer pulses or more of them a turn help, or a longer horizon"
+            f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the "
+            f"limits leave time for {moments}; allow longer pulses, more pulses a turn, or "
+            "a longer horizon"
         )
 
 

@@ -384,11 +384,11 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
             return Cure("horizon", f"limits.horizon = {high:.4g} s is long enough")
         if work.exhausted():
             return Cure("", "")
-    none = f"neither {LATEST:g} times the horizon nor any other limit that is lifted helps alone"
+    none = f"no single limit is the cause, and {LATEST:g} times the horizon does not help either"
     return Cure("", none)
 
 
-NO_AXIAL = "no channel has a torque about axis 3, so none can set the spin; leave --spin out"
+NO_AXIAL = "no channel has a torque about axis 3, so no channel can set the spin; leave out --spin"
 """Reason why a final spin cannot be had."""
 
 
@@ -397,21 +397,18 @@ def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
     if channels:
         return channels
     if not spacecraft.channels:
-        raise Infeasible("the file names no thrusters, and this scheme fires body-fixed ones")
+        raise Infeasible("the file has no thrusters, and this scheme needs body-fixed thrusters")
     if not any(channel.damps for channel in spacecraft.channels):
-        raise Infeasible(
-            "no channel has a torque more transverse than axial, so none can damp a nutation"
-        )
+        raise Infeasible("no channel can damp nutation: each has more axial than transverse torque")
     ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
     time = spacecraft.horizon - spacecraft.limits.earliest
     if time <= 0.0:  # by the file, or where other pulses of the scheme come first
         raise Infeasible(
-            "limits.earliest, or the pulses before, leave no time within limits.horizon"
+            "no time is left before limits.horizon, after limits.earliest or the pulses before"
         )
     raise Infeasible(
-        f"no channel can be on for as long as its min_on_time requires{ticks}, "
-        "at most for its max_on_time, within "
-        f"the {time:.4g} s from limits.earliest to limits.horizon"
+        f"no channel can be on for its min_on_time{ticks}, at most its max_on_time, "
+        f"within the {time:.4g} s from limits.earliest to limits.horizon"
     )
 
 
@@ -435,8 +432,8 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
         }
         nearest = min(off, key=lambda name: off[name])
         return Infeasible(
-            "ω does not turn in this body, so waiting brings no channel to oppose it; "
-            f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off"
+            "no channel opposes the nutation, and waiting does not help: ω does not turn "
+            f"in this body. Nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off"
         )
     builder = ImpulseBuilder(spacecraft, endless=True)
     pulses, ends = [], []
@@ -454,29 +451,29 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
         if spacecraft.growth <= 0.0:
             return Infeasible("no channel ever opposes the nutation")
         return Infeasible(
-            "no channel ever opposes the nutation: dissipation brings the body into flat spin "
-            "before, where ω does not turn in it"
+            "no channel opposes the nutation before dissipation brings the body into flat "
+            "spin, where ω does not turn in the body"
         )
     if not ends:
         best = min(pulses, key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))
         if left < FADED * builder.left:
             return Infeasible(
-                "dissipation takes the nutation out before a channel comes to oppose it, "
-                f"at {best.t:.4g} s"
+                "dissipation damps the nutation before the first channel opposes it, at "
+                f"{best.t:.4g} s"
             )
         return Infeasible(
-            f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} "
-            "of nutation, and "
-            f"firing would leave {turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
+            "the shortest pulse of each channel is too strong: the nutation is "
+            f"{turn_of(spacecraft, left)}, and a pulse would leave "
+            f"{turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
         )
     if min(ends) <= spacecraft.horizon:
         return Infeasible(
-            "channels oppose the nutation within the horizon, but the pulses planned increase it"
+            "channels oppose the nutation within the horizon, but the planned pulses increase it"
         )
     return TooShort(
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
-        f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that",
+        f"the first such pulse would end at {min(ends):.6g} s: set limits.horizon later",
     )
 
 

@@ -96,17 +96,16 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     names = ", ".join(channel.name for channel in channels)
     if spacecraft.nutation_rate == 0.0:
         raise Infeasible(
-            f"ω does not turn in this body, and the channels ({names}) cannot oppose it, "
-            "each twice, half a turn of "
-            f"the axis about H apart, within {bounded_by(spacecraft)}; a steerable torquer can work"
+            f"ω does not turn in this body, and no channel ({names}) can oppose it twice, "
+            f"half a turn of the axis about H apart, within {bounded_by(spacecraft)}; a "
+            "steerable torquer can work"
         )
     if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
-        raise Infeasible(
-            f"dissipation takes the nutation out before the channels ({names}) come to oppose it"
-        )
+        raise Infeasible(f"dissipation damps the nutation before the channels ({names}) oppose it")
     bounds = bounded_by(spacecraft)
     raise Infeasible(
-        f"no two of the channels ({names}) bring H back and oppose the nutation within {bounds}"
+        f"no pair of the channels ({names}) both opposes the nutation and brings H back "
+        f"within {bounds}"
     )
 
 
@@ -152,9 +151,8 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
         if on_time is None:
             times = 0.5 * abs(spacecraft.nutation_rate) * half / (torquer.torque or math.inf)
             raise Infeasible(
-                f"half the nutation needs more than {times:.4g} times the torque of the torquer to "
-                "be taken out within "
-                "half a body nutation period"
+                "the torquer is too weak: half the nutation within half a body nutation period "
+                f"takes more than {times:.4g} times its torque"
             )
         on_times.append(on_time)
     turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
@@ -175,9 +173,9 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
     )
     if best is None:
         raise Infeasible(
-            f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are "
-            f"{sum(on_times):.4g} s long "
-            f"together; no room for both within {bounded_by(spacecraft)}"
+            f"the pulses must be {halves.wait:.4g} s apart, or an odd multiple of that, and "
+            f"are {sum(on_times):.4g} s long together; they do not fit within "
+            f"{bounded_by(spacecraft)}"
         )
     schedule = Schedule(tuple(best))
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):

@@ -478,8 +478,8 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def watched(self) -> tuple[Keep, ...]:
-        """Cones that the spin axis has to keep, and the Sun where it is known and none of them is
-        about it.
+        """Cones that the spin axis has to keep; also the Sun, if it is known and no cone is about
+        it.
         """
         if self.sun is None or any(
             cone.direction is not None and np.array_equal(cone.direction, self.sun)
@@ -528,15 +528,17 @@ class Spacecraft(results.Data, results.Shown):
         return sorted(time for time in times if 0.0 < time < math.inf)
 
     def watched_until(self, last: float) -> float:
-        """Time up to which a flight is looked at whose pulses end at ``last`` s: a nutation period
-        after these and after the last disturbance begins or ends, and `beats_until`.
+        """Time, s, to which a flight with pulses until ``last`` s is judged.
+
+        The later of two times: a nutation period after the last pulse and after the last edge of a
+        disturbance, and `beats_until`.
         """
         return max(max([last, *self.edges]) + self.inertial_period, self.beats_until)
 
     @property
     def beats_until(self) -> float:
-        """Time, s, at which the nutation has gone through its beat, of the period in the body,
-        under the last disturbance that begins after t = 0; 0 without one.
+        """Time, s, at which the nutation has gone through its beat under the last disturbance that
+        begins after t = 0; 0 without one. The beat has the nutation period in the body.
         """
         begun = max((each.begin for each in self.disturbances), default=0.0)
         if begun <= 0.0:
@@ -545,7 +547,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def torquer(self) -> Steerable | None:
-        """Steerable torquer; an ideal one is assumed where the file names no actuator at all."""
+        """Steerable torquer. An ideal one is assumed if the file has no actuator."""
         if self.steerable is None and not self.channels:
             return Steerable()
         return self.steerable
@@ -608,8 +610,8 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def turning_impulse(self) -> float:
-        """|H3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target
-        with less.
+        """|H3| β in N m s with β = `to_turn`: lower bound on the impulse that turns H of a
+        symmetric body to the target.
         """
         return abs(self.axial) * self.to_turn
 
@@ -627,9 +629,8 @@ class Spacecraft(results.Data, results.Shown):
         return attitude.rotate(self.initial.quaternion, in_body)
 
     def at_sun_angle(self, angle: float) -> Vector:
-        """Inertial unit vector (3,) ``angle`` rad from the Sun, of these the nearest to H at t = 0.
-
-        With H along the Sun, or opposite, all are as near: then on the side of the frame's north.
+        """Inertial unit vector (3,), ``angle`` rad from the Sun and nearest to H at t = 0. With H
+        along the Sun, or opposite, the one on the north side of the frame.
         """
         sun = self.sun
         assert sun is not None
@@ -651,7 +652,9 @@ class Spacecraft(results.Data, results.Shown):
         ) if self.attitude is None else declination
 
     def seen_in(self, frame: str) -> Spacecraft:
-        """The same spacecraft with its attitude and all directions in space in another frame."""
+        """The same spacecraft, with its attitude and all inertial directions given in another
+        frame.
+        """
         start, orbit, goal = self.attitude, self.orbit, self.goal
         if start is None or start.frame in (None, frame):
             return self
@@ -732,7 +735,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def fastest(self) -> float:
-        """Faster of spin and nutation in the body, rad/s: what paces the choice of a moment."""
+        """Faster of spin and nutation in the body, rad/s. It sets how fine moments are chosen."""
         return max(abs(self.spin), abs(self.nutation_rate))
 
     @property
@@ -743,7 +746,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def motion_period(self) -> float:
-        """Period of ω in the body, s; with I1 ≠ I2 that of the motion at hand (no wheel)."""
+        """Period of ω in the body, s; with I1 ≠ I2 that of the actual motion (no wheel)."""
         if self.inertia.symmetric or self.inertia.wheel:
             return self.body_period
         from nutdamp.physics import triaxial  # three different moments
@@ -766,7 +769,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def least_impulse(self) -> float:
-        """A |ω0| in N m s: no schedule can remove the nutation of a symmetric body without
-        dissipation with less.
+        """A |ω0| in N m s: lower bound on the impulse that removes the nutation of a symmetric body
+        without dissipation.
         """
         return self.inertia.A * self.transverse_rate

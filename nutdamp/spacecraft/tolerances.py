@@ -78,8 +78,8 @@ class Dispersions:
     )
     inertia_tensor: Known = tolerance(
         "inertia",
-        "Of each entry of the inertia tensor on its own, in the axes of the file, kg m² or %; "
-        "of a product that share of √(Ii Ij).",
+        "Of each entry of the inertia tensor by itself, in the axes of the file, kg m² or %. "
+        "For products the percentage is of √(Ii Ij).",
         "1 %",
     )
     wheel_momentum: Known = tolerance(
@@ -87,14 +87,16 @@ class Dispersions:
     )
     omega0: tuple[Known, Known, Known] = tolerance(
         "rate",
-        "Of each body rate at t = 0, rad/s or %; or a list of three.",
+        "Of each body rate at t = 0, rad/s or %; one tolerance or a list of three.",
         "0.1 deg/s",
         each="axis",
     )
     thrust: ByThruster = by_thruster(
         "force", "Of each thruster, the same in all its pulses, % or N", "3 %"
     )
-    thrust_per_pulse: Known = tolerance("ratio", "Of the thrust, in each pulse anew, %.", "1 %")
+    thrust_per_pulse: Known = tolerance(
+        "ratio", "Of the thrust of each pulse, drawn anew, %.", "1 %"
+    )
     thrust_direction: ByThruster = by_thruster(
         "angle", "Tilt of each force about two axes across it, rad", "0.5 deg"
     )
@@ -102,7 +104,7 @@ class Dispersions:
         "length", "Of each thruster's position, each component, m", "5 mm"
     )
     center_of_mass: Known = tolerance("length", "Of the center of mass, each component, m.", "2 mm")
-    timing: Known = tolerance("time", "Shift of each pulse, s.", "5 ms", "uniform")
+    timing: Known = tolerance("time", "Shift of each pulse, drawn anew, s.", "5 ms", "uniform")
     timing_offset: Known = tolerance("time", "One shift of the whole schedule, s.", "2 ms", "bias")
     attitude: Known = tolerance(
         "angle",
@@ -140,7 +142,7 @@ class Dispersions:
     )
     sensor_delay: Known = tolerance(
         "time",
-        "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.",
+        "Of the delay of the sensor of a loop, s. Values below 0 are drawn again.",
         "2 ms",
         "uniform",
     )
@@ -152,18 +154,18 @@ class Dispersions:
     )
     tank_pressure: Known = tolerance(
         "pressure",
-        "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.",
+        "Of the pressure at t = 0, at which the thrust of the file holds, Pa or %.",
         "0.2 bar",
     )
     tank_final_pressure: Known = tolerance(
-        "pressure", "Of the pressure with nothing left, Pa or %.", "0.2 bar"
+        "pressure", "Of the pressure of the empty tank, Pa or %.", "0.2 bar"
     )
     tank_exponent: Known = tolerance(
-        "ratio", "Of the power of the pressure that the thrust goes with, in %.", "5 %"
+        "ratio", "Of the exponent of pressure in the thrust, in %.", "5 %"
     )
     inertia_per_kg: Known = tolerance(
         "ratio",
-        "Of what each kg that is used takes off the moments of inertia, of all alike, in %.",
+        "Of the decrease of the moments of inertia for each kg used, of all alike, in %.",
         "10 %",
     )
     correlation: tuple[tuple[str, str, float], ...] = ()

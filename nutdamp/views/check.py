@@ -453,7 +453,7 @@ def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True, eq=False)
 class CheckedFile(Data):
-    """A valid ``spacecraft`` file, with ``doubts`` on numbers that are hardly meant."""
+    """A valid ``spacecraft`` file, with ``doubts``: warnings on unlikely numbers."""
 
     spacecraft: Spacecraft
     doubts: tuple[Fault, ...]

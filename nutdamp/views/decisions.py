@@ -201,26 +201,24 @@ def decision_json(judged: Verdict) -> dict[str, Any]:
 
 
 PROVES = (
-    "no firing of these channels within the windows that reaches the goal by the equations costs "
-    "less than bound = "
-    "sum of price times goal - off times |prices of shift| - gained: "
-    "q is at most 1 at every moment for channels that "
-    "act at once, and for the others gained is at least the integral of cost_per_s times (q - 1) "
-    "where q is above 1"
+    "No firing of these channels within the windows that reaches the goal by the "
+    "equations costs less than bound. bound = sum of price times goal - off times "
+    "|prices of shift| - gained. For channels that act at once, q is at most 1 at "
+    "every moment. For the others, gained is at least the integral of cost_per_s "
+    "times (q - 1) where q is above 1."
 )
 
 MODEL = (
-    "small angles, spin as at t = 0: exact for the nutation of symmetric bodies while nothing "
-    "changes the spin, of "
-    "first order for others and for the direction of H; impulses of any size at once for channels "
-    "with acts_at_once, "
-    "at most the full torque at a time for the others"
+    "Small angles, spin as at t = 0. Exact for the nutation of symmetric bodies "
+    "while nothing changes the spin; of first order for other bodies and for the "
+    "direction of H. Channels with acts_at_once give impulses of any size at once, "
+    "the others at most the full torque at a time."
 )
 
 NOT_COUNTED = (
-    "gaps, ticks, least and longest on-times, max_pulses, that channels may not be on together, "
-    "valves, cold nozzles "
-    "and falling pressure: each can only raise the cost of the same equations"
+    "Gaps, ticks, shortest and longest on-times, max_pulses, channels that may not "
+    "be on together, valves, cold nozzles and falling pressure. Each can only "
+    "raise the cost of the same equations."
 )
 
 

@@ -94,8 +94,8 @@ FLOWN_OUTPUTS = (  # the outputs of a schedule, in the order of `OUTPUTS`
 NOTHING = 1e-9  # values, in these units, below which a number is rounding
 
 EMPTY = (
-    "the pulses take more propellant than there is, so that the last ones do not fire, "
-    "and it does not comply"
+    "the pulses need more propellant than the tank has, so the last ones do not "
+    "fire and the case does not comply"
 )
 """Note on a case whose tank runs empty."""
 

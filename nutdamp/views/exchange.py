@@ -148,6 +148,5 @@ def lacking(plan: Plan, form: str) -> str | None:
     if not FORMATS[form].needs_orbit or plan.spacecraft.orbit is not None:
         return None
     return (
-        "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, "
-        "and no whole message"
+        "the spacecraft file has no orbit: the OPM holds the manoeuvres only, and is not complete"
     )

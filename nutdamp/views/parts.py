@@ -44,6 +44,7 @@ from nutdamp.views.text import (
     degrees,
     digits,
     duration,
+    fixed,
     limit_text,
     longitude,
     mass,
@@ -234,7 +235,7 @@ def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
         "Sun phase" if sun_phased(spacecraft) else "spin phase",
         "deg",
         lambda row: math.degrees(row.phase) % 360.0,
-        lambda angle: f"{angle:.1f}",
+        lambda angle: fixed(angle, 1, 360.0),
         PEOPLE,
     )
     return (columns[0], start, phase, *columns[1:])

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -225,20 +224,19 @@ NEWTON = (
 
 
 class SpinRow(NamedTuple):
-    """A spin by its number, with its date, begin, end and period, s, and the pulses commanded in
-    it.
+    """A spin by its number, with its date, begin and period, s, and the pulses commanded in it with
+    their phases, deg.
     """
 
     number: int
     utc: str | None
     begin: float
-    end: float
     period: float
-    fired: list[Pulse]
+    fired: list[tuple[Pulse, float]]
 
 
-def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], str]:
-    return lambda row: BETWEEN.join(number(round(value(row, pulse), DIGITS)) for pulse in row.fired)
+def _several(value: Callable[[Pulse, float], float]) -> Callable[[SpinRow], str]:
+    return lambda row: BETWEEN.join(number(round(value(*pulse), DIGITS)) for pulse in row.fired)
 
 
 SPINS = (
@@ -251,7 +249,7 @@ SPINS = (
         "channel",
         "",
         "",
-        lambda row: BETWEEN.join(pulse.channel for pulse in row.fired),
+        lambda row: BETWEEN.join(pulse.channel for pulse, _ in row.fired),
         where="csv",
         kind=TEXT,
     ),
@@ -259,11 +257,11 @@ SPINS = (
         "phase_deg",
         "",
         "",
-        _several(lambda row, pulse: 360.0 * (1.0 - (row.end - pulse.loaded[0]) / row.period)),
+        _several(lambda _, phase: phase),
         where="csv",
         kind=TEXT,
     ),
-    Column("on_time_s", "", "", _several(lambda _, pulse: pulse.loaded[1]), where="csv", kind=TEXT),
+    Column("on_time_s", "", "", _several(lambda pulse, _: pulse.loaded[1]), where="csv", kind=TEXT),
 )
 
 
@@ -271,8 +269,9 @@ def spin_table(spacecraft: Spacecraft, schedule: Schedule, until: float) -> str:
     """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last
     one is whole.
 
-    ``phase_deg`` is the part of its spin before a pulse is commanded, ``on_time_s`` the length of
-    the command. Without an epoch ``start_utc`` is empty. Raises BadRequest for more than
+    ``phase_deg`` is the angle, 0 to below 360, by which the body has turned about axis 3 in its
+    spin, as a pulse is commanded; with a Sun sensor that since the Sun pulse. ``on_time_s`` is the
+    length of the command. Without an epoch ``start_utc`` is empty. Raises BadRequest for more than
     `MOST_SPINS`, Infeasible where the sensor does not see the Sun.
     """
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
@@ -281,20 +280,24 @@ def spin_table(spacecraft: Spacecraft, schedule: Schedule, until: float) -> str:
             f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)"
         )
     first, begins = _begins(spacecraft, schedule, last)
-    fired: dict[int, list[Pulse]] = {}
-    for pulse in sorted(schedule, key=lambda pulse: pulse.loaded[0]):
-        fired.setdefault(
-            max(int(np.searchsorted(begins, pulse.loaded[0], "right")) - 1, 0), []
-        ).append(pulse)
-    rows = []
-    for index, (begin, end) in enumerate(
-        pairwise(begins[: np.searchsorted(begins, last, "right") + 1].tolist())
-    ):
-        # Spin 0 is the rest of a spin: it ends a whole period after it began.
-        period = end - begin if first + index > 0 else begins[2] - begins[1]
-        rows.append(
-            SpinRow(first + index, spacecraft.utc(begin), begin, end, period, fired.get(index, []))
-        )
+    ends = begins[1:]
+    periods = np.diff(begins)
+    if first == 0:  # the rest of a spin, which began before t = 0
+        periods[0] = periods[1]
+    sense = 1.0 if parts.sun_phased(spacecraft) else math.copysign(1.0, spacecraft.spin)
+    turned = sense * parts.phases(propagation.flown(spacecraft, schedule, last))
+    fired: dict[int, list[tuple[Pulse, float]]] = {}
+    for pulse, angle in zip(schedule, np.degrees(turned).tolist(), strict=True):
+        phase = round(angle % 360.0, DIGITS) % 360.0
+        spin = min(int(np.searchsorted(ends, pulse.loaded[0], "right")), len(ends) - 1)
+        # A pulse at the very end of a spin, with a phase rounded to 0, is in the next one.
+        passed = 1.0 - (ends[spin] - pulse.loaded[0]) / periods[spin]
+        fired.setdefault(spin + round(passed - phase / 360.0), []).append((pulse, phase))
+    latest = max(int(np.searchsorted(begins, last, "right")) - 1, *fired, 0)
+    rows = [
+        SpinRow(first + index, spacecraft.utc(begin), begin, periods[index], fired.get(index, []))
+        for index, begin in enumerate(begins[:-1][: latest + 1].tolist())
+    ]
     return DataTable("Spins", SPINS, rows).csv()
 
 
@@ -366,9 +369,8 @@ def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
 SHOWN = 1e-9 * math.pi / 180.0  # rad; smaller differences are shown as rounding
 BUDGET = "Error budget: what each imperfection leaves, alone"  # the title of `budget_table`
 BUDGET_NOTE = (  # note on `budget_table`
-    "Plans are tuned to what is fired, so that the rows do not add up. "
-    "A row 'without' shows what the same pulses "
-    "leave without that effect, more or less."
+    "The rows do not add up, because a plan is tuned to all effects together. A "
+    "row 'without' shows what the same pulses leave without that effect."
 )
 
 

@@ -51,9 +51,10 @@ class KeyGuide(NamedTuple):
         if value is fields.REQUIRED:
             default = "required"
         elif "default" not in self.field.description.casefold():
-            default = "default none" if value is None or value == [] else f"default {value:g}"
+            default = "optional" if value is None or value == [] else f"default {value:g}"
         facts = [unit, default, "" if example is None else f"example: `{flow(example)}`"]
-        return f"{self.field.description} {'; '.join(filter(None, facts))}"
+        told = "; ".join(filter(None, facts))
+        return f"{self.field.description} {told[:1].upper()}{told[1:]}"
 
 
 def keys(model: type[fields.Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
@@ -126,8 +127,8 @@ BEGIN = """# The spacecraft file
 
 every key of the spacecraft file; file.thrusters, file.limits.tick
 
-`nutdamp init` writes one with comments, `nutdamp init --from ace` one of the
-examples in `configs/`, each with its sources (`--list` names them):
+A spacecraft file is a YAML file. `nutdamp init` writes one with comments. `nutdamp init --from ace`
+writes one of the examples in `configs/`, with its sources; `--list` names them. A short one:
 
 ```yaml
 name: Sounder-1
@@ -138,11 +139,13 @@ thrusters:
      max_on_time: 2 s}
 ```
 
-A number that is unlikely in SI, such as a position of 800, is accepted with a warning that names \
-the likely unit.
-
-A value is a number in SI or a text with a unit. Any key can also be given as --set KEY=VALUE, \
-entries of a list by name or position: --set thrusters.T1.force=12N, --set omega0[2]=3."""
+1. A value is a number in SI, or a text with a unit: `2`, `2 s`, `30 rpm`.
+2. A number that is unlikely in SI, such as a position of 800, gives a warning with the likely
+   unit.
+3. Each key can also be set by an option: `--set limits.horizon=90s`. Entries of a list have a name
+   or a number: `--set thrusters.T1.force=12N`, `--set omega0[2]=3`.
+4. Vectors have the axes of the file. Spin axis 3 is the principal axis nearest to its third axis.
+   The two are one unless `inertia.tensor` tilts the principal axis."""
 
 
 def _file() -> str:

@@ -90,7 +90,7 @@ class Contents(NamedTuple):
         index = int(np.searchsorted(self.times, time))
         if index == len(self.times):
             last = f"{self.times[-1]:.6g} s after its first record" if index else "without records"
-            raise BadRequest(f"the history ends {last}: expected a time in it")
+            raise BadRequest(f"the history ends {last}: expected a time within it")
         rates, remarks = self.rates[index], self.remarks
         unknown = np.isnan(rates)
         speed = abs(spin if unknown[2] else rates[2])
@@ -112,11 +112,15 @@ class Contents(NamedTuple):
             powers = np.vander(span / scale, increasing=True)
             weights = np.linalg.solve(powers.T, np.eye(len(near))[1]) / scale
             rates = np.where(unknown, weights @ vectors, rates)
-            remarks += ("rates that the message does not have follow from its attitudes nearby",)
+            remarks += ("the message lacks rates; they follow from its attitudes near the record",)
         elif not unknown[2]:
             rates = np.nan_to_num(rates)
+        epoch = self.epoch.plus(float(self.times[index]))
+        if len(self.times) > 1:
+            late = f"{self.times[index] - self.times[0]:.6g} s after the first"
+            remarks = (f"record used: {late}, at {epoch.text}Z", *remarks)
         return self._replace(
-            epoch=self.epoch.plus(float(self.times[index])),
+            epoch=epoch,
             times=np.zeros(1),
             quaternions=self.quaternions[[index]],
             rates=rates[None],
@@ -213,7 +217,7 @@ class MessageReader:
         in_body = BODY.fullmatch(name) is not None
         frame = name if in_body else FRAME_NAMES.get(name)
         if fixed and not in_body:
-            raise ValueError(f"{name!r} is no frame fixed in the body; expected SC_BODY_1")
+            raise ValueError(f"{name!r} is not a body frame; expected SC_BODY_1")
         if frame is None:
             expected = f"SC_BODY_1 or one of {', '.join(FRAME_NAMES)}"
             raise ValueError(f"{name!r} is no frame known here; expected {expected}")
@@ -294,7 +298,7 @@ class Fields:
             turn = parts / np.where(lengths > 0.0, lengths, 1.0)[:, None]
         elif "ANGLE_1" in columns:
             if "EULER_ROT_SEQ" not in self.lines:
-                self.fault("EULER_ROT_SEQ", "missing; angles need the axes of their turns")
+                self.fault("EULER_ROT_SEQ", "missing; the angles need their sequence of axes")
             angles = [np.radians(columns[name]) for name in names(message.ANGLES)]
             turn = euler(self.values.get("EULER_ROT_SEQ", "ZXZ"), *angles)
         else:
@@ -387,7 +391,7 @@ def read_message(path: str) -> Contents:
     if word not in FORMS or version != VERSION:
         expected = f"{listed([*FORMS], 'or')} = {VERSION}, or stk.v.11.0 (.a)"
         reader.fault(
-            line, "", f"{first[:40]!r} begins no message that is read; expected {expected}"
+            line, "", f"{first[:40]!r} does not begin a known message; expected {expected}"
         )
         raise FaultyFile([*reader.faults.values()])
     form = FORMS[word]
@@ -418,7 +422,7 @@ def _sections(reader: MessageReader, form: Form) -> list[BlockLines]:
                 reader.fault(line, content, f"unknown block; known are {starts}")
                 continue
             if edge[1] in reader.lines and not form.blocks[edge[1]].repeated:
-                problem = "a second block of this kind; which one counts is not said"
+                problem = "a second block of this kind; remove one of the two"
                 reader.fault(line, edge[1], problem)
             if form.blocks[edge[1]].skipped:
                 reader.remarks.append(f"{edge[1]} blocks are not read")
@@ -547,10 +551,10 @@ def _apm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
                 where = f"line {section.line}: SPIN gives"
                 # The product of quaternions is the cosine of half the angle between them.
                 if abs(float(np.vdot(quaternion, turn))) < 1.0 - AGREES**2 / 8.0:
-                    other = "another attitude than the blocks before it, which count"
+                    other = "a different attitude from the blocks before it, which count"
                     reader.remarks.append(f"{where} {other}")
                 if np.linalg.norm(rates - spun) > AGREES * np.linalg.norm(rates):
-                    reader.remarks.append(f"{where} other rates than ANGVEL, which counts")
+                    reader.remarks.append(f"{where} different rates from ANGVEL, which counts")
                 if np.isnan(rates).any():
                     rates, nutation = spun, np.radians(columns.get("NUTATION", nutation))
                 quaternion = np.where(np.isnan(quaternion), turn, quaternion)

@@ -22,7 +22,8 @@ import numpy as np
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
-from nutdamp.common.time import DIGITS, Epoch
+from nutdamp.common.results import Note, note
+from nutdamp.common.time import DIGITS, MONTH, Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, printable
 from nutdamp.files.ccsds import message
 from nutdamp.files.ccsds.message import (
@@ -301,6 +302,11 @@ def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
 
 ORIGINATOR = "NUTDAMP"
 
+PRODUCTS = (  # comment on the signs of INERTIA
+    "IXY, IXZ, IYZ are products of inertia such as the sum of m*x*y, as CCSDS 504.0-B-2 has them: "
+    "minus the entries of the tensor off its diagonal."
+)
+
 
 def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which
@@ -327,7 +333,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         blocks.append(_block("SPIN", [*frames, *values], euler_rate(spin, rates[2])))
     # The products are minus the entries off the diagonal (annex F6).
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = spacecraft.inertia.tensor.tolist()
-    blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz]))
+    blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz], PRODUCTS))
     blocks += _manoeuvres("MAN", plan, reference)
     about = block("", message.APM_METADATA, [*_identity(spacecraft), None, "UTC"])
     return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
@@ -606,17 +612,20 @@ def acute(record: Contents) -> float:
     return min(stated, math.pi - stated)
 
 
-def contradictions(record: Contents, spacecraft: Spacecraft, remains: str) -> list[str]:
-    """Contradiction between the nutation that a record states and that by inertia and period, of
-    which one ``remains``.
+def contradictions(record: Contents, spacecraft: Spacecraft, remains: str) -> list[Note]:
+    """Note on a nutation that a record states and that is not the one by inertia and period; the
+    file has what ``remains``.
     """
     stated, follows = acute(record), spacecraft.widest.nutation
     if math.isnan(stated) or abs(follows - stated) <= ROUNDED + SAME_NUTATION * stated:
         return []
     return [
-        f"SPIN says a nutation of {math.degrees(stated):.4g} deg, but with the moments of inertia "
-        f"NUTATION_PER gives one of {math.degrees(follows):.4g} deg; one of the three is wrong, "
-        f"and the file has {remains}"
+        note(
+            "message-contradicts",
+            stated_deg=math.degrees(stated),
+            follows_deg=math.degrees(follows),
+            remains=remains,
+        )
     ]
 
 
@@ -656,9 +665,9 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
 
 def merge(
     source: Source, contents: Contents, time: float = 0.0, *, inertia: bool
-) -> tuple[str, tuple[str, ...], list[str]]:
+) -> tuple[str, tuple[str, ...], list[Note]]:
     """Text of a spacecraft file with the motion at the first record from ``time`` s on, and with
-    mass and ``inertia`` where asked for; remarks, and doubts.
+    mass and ``inertia`` where asked for; remarks, and notes.
 
     Of SPIN with a nutation the spin and the angle stay, whatever C/A the file has. Raises
     BadRequest where the message has not what is to be merged, or the file would be none.
@@ -666,7 +675,7 @@ def merge(
     if inertia and contents.tensor is None:
         raise BadRequest("the message has no inertia to merge")
     before = source.read(lambda _: None)
-    after, doubts, record = before, list[str](), contents
+    after, doubts, record = before, list[Note](), contents
     if inertia and contents.tensor is not None:
         moments = Inertia(*principal_axes(contents.tensor), before.inertia.wheel)
         after = replace(after, inertia=moments)
@@ -678,11 +687,15 @@ def merge(
         rates = rates if np.isnan(record.rates).any() else record.rates[0]
     after = replace(after, omega0=axes.T @ rates)
     if record is not contents and acute(record) > 0.0:
-        doubts = contradictions(record, after, "spin and nutation of the message, not its period")
+        doubts = contradictions(record, after, "the spin and nutation of the message")
         first, second, third = after.inertia.momentum(after.omega0).tolist()
         share = abs(third) * math.tan(acute(record)) / math.hypot(first, second)
         after = replace(after, omega0=after.omega0 * (share, share, 1.0))
     turned = not np.isnan(turn).any()
+    start = None if before.attitude is None else before.attitude.epoch
+    if turned and start is not None:
+        apart = abs(record.epoch.since(Epoch.parse(start)))
+        doubts += [note("record-far", apart_lasting_s=apart)] if apart > MONTH else []
     if turned:
         quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
         own = None if before.attitude is None else before.attitude.frame

@@ -493,9 +493,9 @@ def refusal(search: Search) -> Infeasible:
         if most * impulse < spacecraft.least_impulse:
             share = 100.0 * most * impulse / spacecraft.least_impulse
             return Infeasible(
-                f"limits.max_pulses = {most} is too few: so many pulses give at most {share:.4g} % "
-                "of the impulse that takes out the nutation, "
-                f"{math.ceil(spacecraft.least_impulse / impulse)} pulses or more all of it"
+                f"limits.max_pulses = {most} is too few: these pulses give at most {share:.4g} "
+                f"% of the impulse needed; {math.ceil(spacecraft.least_impulse / impulse)} or "
+                "more give all"
             )
     unproved = search.first.unmet <= UNMET or math.isinf(search.first.unmet)
 
@@ -513,17 +513,20 @@ def refusal(search: Search) -> Infeasible:
                 break
             if search.feasible(horizon):
                 needed = search.least_horizon(0.5 * horizon, horizon, NAMED)
-                cures.append(f"by small angles limits.horizon of {needed:.4g} s or more is needed")
+                cures.append(f"limits.horizon of {needed:.4g} s or more is needed, at small angles")
                 break
         if search.equations.shift and spacecraft.goal.axis is None and not work.exhausted():
             free = Search(spacecraft, replace(search.options, free_axis=True, shift=None))
             if by_program(free, None) is not None:
-                cures.append("with --free-axis there is a schedule")
+                cures.append("with --free-axis a schedule exists")
     reason = f"within {spacecraft.horizon:.4g} s {shortfall(search)}"
     if unproved:
-        reason = f"on the true motion none was found within {bounded_by(spacecraft)}"
+        reason = (
+            f"within {bounded_by(spacecraft)} the search found no schedule for the true "
+            "motion; one may still exist"
+        )
     if search.first.unmet <= UNMET:
-        reason = f"for small angles there are schedules; {reason}"
+        reason = f"schedules exist at small angles; {reason}"
     text = "; ".join(filter(None, [reason, *cures]))
     return NotFound(text) if unproved else Infeasible(text)
 
@@ -536,15 +539,15 @@ def shortfall(search: Search) -> str:
     if nutation > UNMET:
         names = ", ".join(channel.name for channel in search.channels)
         share = 100.0 * min(nutation, 1.0)
-        return f"the channels ({names}) cannot take out the nutation, {share:.3g} % of it stays"
-    failing = "H cannot be kept where it is"
+        return f"the channels ({names}) cannot remove the nutation: {share:.3g} % of it stays"
+    failing = "H would shift"
     if goal.axis is not None:
         failing = "H cannot be brought to the target"
     plain = search.program(equations=EndEquations(shift=search.equations.shift))
     if search.equations.spin and plain.solve().unmet <= UNMET:
         failing = "the spin cannot be brought to the rate of the goal"
     if spacecraft.transverse_rate > 0.0:
-        failing = f"the nutation can be taken out, but {failing}"
+        failing = f"the nutation can be removed, but {failing}"
     return failing
 
 

@@ -482,8 +482,9 @@ def test_times_of_another_system_become_utc_and_a_nutation_that_contradicts_is_s
         apm, _, body, pulses = take(text.replace("= UTC", f"= {system}"))
         moments.append(apm.epoch)
         assert [pulse.start for pulse in pulses] == [3600.0]
-        (said,) = contradictions(apm, body, "the latter nutation")
-        check_text("files.nutation-contradicts", said)
+        (said,) = contradictions(apm, body, "this one")
+        assert said.code == "message-contradicts"
+        assert said.values["stated_deg"] == pytest.approx(0.1)
         assert (
             contradictions(apm._replace(nutations=np.array([body.widest.nutation])), body, "") == []
         )

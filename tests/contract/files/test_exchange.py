@@ -25,7 +25,7 @@ from support.golden import check_text, refusal
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.message import APM_BLOCKS
-from nutdamp.files.ccsds.write import comment, label, number
+from nutdamp.files.ccsds.write import PRODUCTS, comment, label, number
 from nutdamp.files.export import TURN, interpolated
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
@@ -137,6 +137,7 @@ def test_names_epochs_and_products_of_inertia_are_those_of_the_standard() -> Non
         "IXZ": "-6.0",
         "IYZ": "4.0",
     }
+    assert f"COMMENT {PRODUCTS}" in text
 
 
 def test_sixty_rpm_of_a_flat_body_spin_backwards_about_the_axis() -> None:
@@ -611,6 +612,22 @@ def test_a_spin_is_a_turn_about_axis_3(moments: tuple[float, float, float], spin
     assert abs(periods[-1] / periods[0] - 1.0) > 0.01
 
 
+@pytest.mark.parametrize("spin", [3.0, -3.0])
+def test_a_phase_is_the_angle_turned_since_the_spin_began(spin: float) -> None:
+    """Not the share of its time, where ω3 changes; never 360, and none at the end of a spin."""
+    screw = channel("screw", 6.0, 0.0, math.copysign(9.0, spin))
+    body = spinner(spin=spin, degrees=8.0, channels=(screw,))
+    turn = 2.0 * math.pi / abs(spin)
+    times = (turn * (1.0 - 1e-13), 2.2 * turn, 3.3 * turn)
+    pulses = Schedule(tuple(channel_pulse(screw, t + 0.4, 0.8) for t in times))
+    rows = table(spin_table(body, pulses, 9.0))
+    fired = [(index, float(row["phase_deg"])) for index, row in enumerate(rows) if row["channel"]]
+    angles = turned(body, pulses, [pulse.start for pulse in pulses])
+    whole = [360.0 * index + phase for index, phase in fired]
+    assert whole == pytest.approx([abs(math.degrees(angle)) for angle in angles], abs=1e-7)
+    assert fired[0] == (1, 0.0)
+
+
 def test_every_pulse_is_in_its_spin_with_its_phase() -> None:
     body = aimed(
         spinner(degrees=0.0, channels=cross(60.0), limits=Limits(earliest=7.0)), 12.0, 45.0
@@ -639,6 +656,13 @@ def test_every_pulse_is_in_its_spin_with_its_phase() -> None:
     assert float(rows[-1]["start_s"]) < starts[-1]
 
 
+def sun_azimuth(body: Spacecraft, pulses: Schedule, time: float) -> float:
+    """Azimuth of the Sun in the body, deg, by the reference integrator."""
+    moved = reference.fly(body.inertia.moments, body.omega0, events(pulses), time, np.eye(3))
+    seen = moved.rotation.T @ present(body.sun)
+    return math.degrees(math.atan2(seen[1], seen[0]))
+
+
 def test_with_a_sensor_spins_are_counted_by_sun_pulses() -> None:
     """At each the Sun is at the azimuth of the sensor,
     and blocks are numbered and delayed alike.
@@ -650,20 +674,17 @@ def test_with_a_sensor_spins_are_counted_by_sun_pulses() -> None:
     rows = table(export_text(plan, "spin-table"))
     assert [rows[0][name] for name in HEADER[:3]] == ["0", "1998-01-07T12:00:00.000000000Z", "0.0"]
     for row in rows[1::3]:
-        moved = reference.fly(
-            body.inertia.moments, body.omega0, events(plan.pulses), float(row["start_s"]), np.eye(3)
-        )
-        seen = moved.rotation.T @ present(body.sun)
-        assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-6)
+        seen = sun_azimuth(body, plan.pulses, float(row["start_s"]))
+        assert seen == pytest.approx(35.0, abs=1e-6)
     fired = {int(row["spin"]): row for row in rows if row["pulses"] != "0"}
     blocks = plan.pulses.blocks
     assert sorted(fired) == [
         block.first + index * block.every for block in blocks for index in range(block.count)
     ]
     row = fired[blocks[0].first]
-    assert float(row["phase_deg"]) / 360.0 * float(row["period_s"]) == pytest.approx(
-        blocks[0].delay, abs=1e-8
-    )
+    assert plan.pulses[0].start - float(row["start_s"]) == pytest.approx(blocks[0].delay, abs=1e-8)
+    seen = sun_azimuth(body, plan.pulses, plan.pulses[0].start)
+    assert float(row["phase_deg"]) == pytest.approx((35.0 - seen) % 360.0, abs=1e-6)
     assert float(row["on_time_s"]) == pytest.approx(blocks[0].width, rel=1e-12)
 
 
@@ -684,5 +705,5 @@ def test_a_pulse_before_the_first_sun_pulse_is_in_spin_0_and_commands_are_those_
         row for row in table(spin_table(body, Schedule((pulse,)), 10.0)) if row["pulses"] == "1"
     ]
     assert float(row["on_time_s"]) == 0.2
-    phase = 360.0 * (6.0 - float(row["start_s"])) / float(row["period_s"])
-    assert float(row["phase_deg"]) == pytest.approx(phase, abs=1e-6)
+    phase = 35.0 - sun_azimuth(body, Schedule(), 6.0)
+    assert float(row["phase_deg"]) == pytest.approx(phase % 360.0, abs=1e-6)

@@ -22,6 +22,7 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.errors import BadRequest, FaultyFile
+from nutdamp.estimation.results import doubts
 from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.ccsds.write import imported, merge
 from nutdamp.files.reader import Source
@@ -82,6 +83,27 @@ def test_every_history_is_telemetry(write: Write, kind: str) -> None:
     estimate = nutdamp.fit(path, guess, ignored=print).spacecraft()
     assert pytest.approx(1.3125, abs=2e-5) == estimate.inertia.C / estimate.inertia.A
     assert estimate.omega0 == pytest.approx(motions[0].rates, abs=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("year", "far"), [("2006-03", False), ("2006-01", True), ("2004-03", True)]
+)
+def test_a_history_months_from_the_file_is_named(
+    run: Run, tmp_path: Path, year: str, far: bool
+) -> None:
+    (tmp_path / "history.txt").write_text(histories.acm(histories.flown(161)))
+    dated = DISC.replace("2006-03", year)
+    (tmp_path / "disc.yaml").write_text(dated)
+    into = ("import", "history.txt", "--into", "disc.yaml", "-o", "now.yaml")
+    shown = run(*into, "--at", "0s", status=0).stderr
+    assert ("warning[record-far]" in shown) == far
+    assert "record used: 0 s after the first, at 2006-03-31T05:00:00.071" in shown
+    used = run(*into, "--at", "0.3s", status=0).stderr
+    assert "record used: 0.375 s after the first" in used
+    assert "12.5s" in run(*into, "--at", "-1s", status=2).stderr
+    spacecraft = nutdamp.read(dated).with_(dispersions={"C": {"normal": "5 %"}})
+    fitted = nutdamp.fit(tmp_path / "history.txt", spacecraft, ignored=print)
+    assert ("record-far" in {note.code for note in doubts(fitted.core)}) == far
 
 
 def test_physical_properties_are_merged_where_asked_for(run: Run, tmp_path: Path) -> None:
@@ -166,7 +188,7 @@ def test_faults_have_their_line_and_field(write: Write) -> None:
 def test_a_parameter_message_is_no_telemetry(write: Write) -> None:
     plan = messages.planned("prolate")
     path = write(export_text(plan, "apm"), "message.apm")
-    with pytest.raises(BadRequest, match="expected a history"):
+    with pytest.raises(BadRequest, match="no history of attitudes"):
         nutdamp.fit(path, plan.spacecraft, ignored=print)
     with pytest.raises(FaultyFile, match="convert to KVN"):
         nutdamp.fit(

@@ -243,7 +243,7 @@ def test_what_neither_data_nor_file_tell_is_named() -> None:
         3.0 * slopes[:, fitted.index("omega_2")],
     ):  # nothing, or not apart from another
         slopes[:, fitted.index("omega_1")] = lost
-        with pytest.raises(Infeasible, match="does not tell all of omega_1, omega_2, omega_3"):
+        with pytest.raises(Infeasible, match="does not determine all of omega_1, omega_2, omega_3"):
             expect_told(replace(fitted, jacobian=slopes))
 
 
@@ -252,7 +252,7 @@ def test_a_signal_of_which_much_would_be_left_out_is_named() -> None:
     values = np.array(case.record.signals["omega_1"])
     values[::4] += 300.0 * case.noise * np.random.default_rng(1).normal(size=len(values[::4]))
     with pytest.raises(
-        Infeasible, match=r"does not explain omega_1: 2\d % of it would be left out"
+        Infeasible, match=r"does not explain omega_1: 2\d % of its samples would be left out"
     ):
         fit(
             case.spacecraft,

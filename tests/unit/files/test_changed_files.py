@@ -611,7 +611,7 @@ def test_the_nutation_of_a_message_stays_whatever_the_ratio_of_the_file(
     C/A = 1.2009.
     """
     text = case("apm-into.yaml").read_text()
-    for moment, doubt in (("1300", "NUTATION_PER gives one of 4.621 deg"), ("1200.9", "")):
+    for moment, doubt in (("1300", "message-contradicts"), ("1200.9", "")):
         (tmp_path / "other.yaml").write_text(text.replace("1300", moment))
         result = run(
             "import",

@@ -134,9 +134,7 @@ def test_the_horizon_that_is_named_is_long_enough(scheme: str) -> None:
     for torque, shortest in itertools.product((3.0, 30.0, 300.0), (0.0, 0.02)):
         jet = (channel("T", torque, 0.0, 0.0, min_on_time=shortest),)
         why = why_not((scheme, spinner(channels=jet, limits=Limits(horizon=0.3))))
-        named = present(
-            re.search(r"would end at (\S+) s: set limits.horizon beyond that", why), why
-        )
+        named = present(re.search(r"would end at (\S+) s: set limits.horizon later", why), why)
         feasible_by(
             scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]) * (1.0 + 1e-5)))
         )
@@ -1000,7 +998,7 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
             "crash-hang-near-sphere-dissipation",
             (),
             3,
-            r"dissipation takes the nutation out before the channels.*? it",
+            r"dissipation damps the nutation before the channels.*? it",
         ),
         ("crash-dissipation-near-sphere-overflow", (), 3, ""),
         ("crash-halfcone-trim-crash", (), 0, ""),

@@ -81,6 +81,21 @@ def test_a_principal_axis_off_the_file_by_more_than_the_nutation_allowed_is_a_wa
     assert not [*spacecraft_notes(EXAMPLE)]
 
 
+def test_opposite_blocks_with_delays_in_time_are_named() -> None:
+    """As the spin changes they drift apart."""
+    body = read_spacecraft(example_text("isee-3"), "isee-3.yaml")
+    commands = present(body.commands)
+    codes = [
+        [entry.code for entry in spacecraft_notes(replace(body, commands=changed))]
+        for changed in (
+            replace(commands, per_turn=2),
+            replace(commands, per_turn=2, delay_is="angle"),
+            commands,
+        )
+    ]
+    assert codes == [["delays-in-time"], [], []]
+
+
 @pytest.mark.parametrize(("angles", "isps", "codes"), [
     ((0, 22), (220, 220), ["channels-push-alike"]),
     ((0, 23), (220, 220), []),
