@@ -210,10 +210,6 @@ def made_of(
     return Report(compared, page, page_html(page))
 
 
-DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis error")
-"""Columns of the comparison of schemes in which dots show the numbers to scale."""
-
-
 class Repeat(NamedTuple):
     """Data to make the page again: the command, and the input file by name and text.
 
@@ -417,7 +413,7 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
     """
     yield Prose(sentence(joined(reasons(compared))))
     chosen = compared.recommended
-    yield document.sheet(scheme_table(compared, chosen), dots=DOTS)
+    yield document.sheet(scheme_table(compared, chosen))
     rows = [("", note) for note in more_notes]
     for plan in compared.plans:
         if plan.feasible and plan is not chosen:

@@ -238,14 +238,6 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
         ("", None),
     ):
         assert number_in(text) == value
-    made = Sheet(
-        "a", (Heading("b"), Heading("c", "s")), (("1", "4"), ("2", "1"), ("3", "–")), dots=("c",)
-    )
-    assert [[cell.dot for cell in row] for row in made.cells] == [
-        [None, 100.0],
-        [None, 25.0],
-        [None, None],
-    ]
     shares = Sheet(
         "a", (Heading("b"), Heading("c", "%")), (("1", "40.4"), ("2", "bias")), bars=("c",)
     )
