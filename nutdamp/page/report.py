@@ -512,8 +512,8 @@ PICTURES = {
         "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
     ),
     "acceptance": (
-        "A scheme whose contour lies in the grey box keeps both limits in enough cases; a dashed "
-        "one does not comply. Schemes far outside are arrows at the edge.",
+        "A scheme whose point, or whole contour, lies in the grey box keeps both limits. Dashed: "
+        "too few cases comply. Schemes far outside are arrows at the edge.",
         "Acceptance box: nutation left against the tightest other limit, one contour a scheme",
     ),
     "trade": (
