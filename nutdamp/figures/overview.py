@@ -404,8 +404,8 @@ def course(flight: Flight, track: Track, *, outlines: Mapping[str, Vector], narr
     """Axis track above nutation, firings and changing spin; ``narrow``: for a phone."""
     courses = _courses(flight, track, rates=False)
     sizes = [*courses.values()]
-    figure = style.sheet(style.PHONE if narrow else 5.2, 5.0 + sum(sizes))
-    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.6, *sizes])
+    figure = style.sheet(style.PHONE if narrow else 5.2, 4.4 + sum(sizes))
+    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.4, *sizes])
     _axis_track(figure.add_subplot(grid[0]), flight, track, outlines)
     _draw_courses(figure, [grid[row + 1] for row in range(len(sizes))], flight, track, courses)
     return figure

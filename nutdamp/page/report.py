@@ -341,6 +341,8 @@ def _sections(
     chosen = compared.recommended
     dispersed = _cases_of(compared)
     yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
+    if chosen is not None:
+        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
     if dispersed is not None:
         yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
     if traded:
@@ -350,8 +352,6 @@ def _sections(
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
         entries = [(name, text) for name, text in identity if text]
         blocks = manoeuvre_blocks(chosen, judged, entries, page.summary)
-        # Before the sheet, which is a page of its own in print: one line after it would be another.
-        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
         yield PageSection("manoeuvre", title, tuple(blocks))
     yield PageSection("background", "Background", tuple(_background(compared, judged, repeat)))
 
