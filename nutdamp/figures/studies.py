@@ -296,7 +296,7 @@ OTHERS = (TURNED, INK, FIRED, GREY)  # colours of the schemes that are not recom
 def acceptance_figure(
     judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
 ) -> Figure:
-    """The box of `acceptance`, for the report and ``plan --figure acceptance``."""
+    """The box of `acceptance`, for the report and ``plan --figure box``."""
     figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
     acceptance(figure.subplots(), judged, others)
     style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))

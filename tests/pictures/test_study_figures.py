@@ -413,7 +413,7 @@ def test_h_may_end_about_its_goal_and_its_contour_holds_the_cases(which: str) ->
 @pytest.mark.deep
 def test_the_acceptance_box_names_every_scheme_with_cost_and_share() -> None:
     compared = compare(BODY, samples=2_048)
-    figure = compared.figure("acceptance")
+    figure = compared.figure("box")
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
@@ -430,7 +430,7 @@ def test_the_acceptance_box_names_every_scheme_with_cost_and_share() -> None:
 def test_without_cases_schemes_are_points_and_a_missing_limit_is_no_edge() -> None:
     free = replace(BODY, dispersions=None, requirement=Requirement(math.radians(0.5)))
     compared = compare(free, ["one-pulse", "two-pulse"])
-    (axes,) = compared.figure("acceptance").axes
+    (axes,) = compared.figure("box").axes
     assert axes.get_ylabel() == "momentum shift, ° (no limit)"
     dots = [np.asarray(one.get_xydata())[0] for one in axes.lines if one.get_marker() == "o"]
     shifts = [math.degrees(plan.flight.residual.momentum_shift) for plan in compared]
