@@ -158,7 +158,14 @@ def carry_options(when: str) -> Callable[[Command], Command]:
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     """``--plot FILE`` and the choice of the picture among ``names``, the default first."""
-    which = defaulted("--figure", NameType(names), names[0], "What --plot draws.")
+    drawn = ", ".join((f"{names[0]} (default)", *names[1:]))
+    which = click.option(
+        "--figure",
+        type=NameType(names),
+        default=names[0],
+        metavar="NAME",
+        help=f"Picture: {drawn}.",
+    )
     where = click.option(
         "--plot", type=OutputName(), help="Draw it (.png, .svg, .pdf; needs extra plot)."
     )

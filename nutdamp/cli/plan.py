@@ -93,7 +93,7 @@ def robust_of(job: Job, compared: Comparison) -> RobustComparison:
 @click.option("--json", type=OUTPUT, help="Write all plans and residuals.")
 @click.option("--certificate", type=OUTPUT, help="Write the proof of the least cost (JSON).")
 @carry_options("end of the last pulse")
-@plot_options((*FIGURES, "acceptance"))
+@plot_options((*FIGURES, "box"))
 @screen_options
 def plan_command(
     job: Job,

@@ -330,7 +330,7 @@ def trade_command(
 @click.option(
     "--plot",
     type=OUTPUT,
-    help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).",
+    help="Draw nutation, dead band and firings (.png, .svg, .pdf; needs extra plot).",
 )
 @screen_options
 def loop_command(
@@ -443,7 +443,7 @@ def budget_command(
 )
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
 @click.option(
-    "--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot)."
+    "--plot", type=OUTPUT, help="Draw residuals and changes (.png, .svg, .pdf; needs extra plot)."
 )
 @screen_options
 def fit_command(

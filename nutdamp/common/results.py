@@ -106,7 +106,7 @@ class Drawn:
         it has several.
 
         Of plans and flights that is ``overview`` (the default) or ``motion``, of plans also
-        ``acceptance``.
+        ``box``.
         Raises BadRequest for other names, MissingExtra without matplotlib, Infeasible for a plan
         without a schedule.
         """

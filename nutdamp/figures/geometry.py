@@ -24,9 +24,6 @@ MOST_ROWS = (
 RIM = 121  # points around the rim of a cone
 LEAST = 1e-9  # degrees or deg/s below which a motion is drawn as a point
 
-INSET_FROM, INSET_BELOW = 1e-4, 0.15
-"""Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
-
 CLOSE = (
     1.0 / 125.0
 )  # part of the time shown below which firings cannot be distinguished: 4 points on a sheet
@@ -238,18 +235,6 @@ def aimed(flight: Flight) -> Vector:
 def sky_target(flight: Flight, track: Track) -> Vector:
     """(n, 2): the target axis in the same angles; empty where there is none."""
     return on_sky(sky_plane(flight, track.momentum[0]), aimed(flight))
-
-
-def momentum_inset(flight: Flight, track: Track) -> Vector | None:
-    """(n, 2): the path of H and the target as angles in degrees, where the axis track is too wide
-    for it; else None.
-    """
-    path, momentum = sky_paths(flight, track)
-    small = np.vstack([momentum, sky_target(flight, track)])
-    share = float(np.ptp(small, axis=0).max()) / max(
-        float(np.ptp(np.vstack([path, small]), axis=0).max()), LEAST
-    )
-    return small if len(flight.schedule) and INSET_FROM < share < INSET_BELOW else None
 
 
 def once(points: Vector) -> Vector:

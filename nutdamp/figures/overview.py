@@ -47,13 +47,6 @@ MANY, SPARSE = (
     40,
 )  # numbers of firings above which lines and arrowheads are small, and up to which each has a dot
 
-ROOM = 1.8
-INSET = (0.675, 0.17, 0.315, 0.66)
-"""Width of the axis track with an inset over that without, and the box of the inset as shares of
-the panel.
-"""
-
-
 NO_OUTLINES: Mapping[str, Vector] = MappingProxyType({})  # of an axis track without a verdict
 
 
@@ -141,17 +134,9 @@ def overview(flight: Flight, track: Track, *, box: Callable[[Axes], None] | None
     """Motion, and the globe where it has something to show, above history."""
     courses = _courses(flight, track)
     sizes = [*courses.values()]
-    ratios = [1.0, ROOM if geometry.momentum_inset(flight, track) is not None else 1.0]
-    width = 9.6
-    tall = TALL
     globe = sphere.has_globe(flight, track)
-    if globe:
-        ratios.append(1.0)
-        width = BROAD
-        tall = BROAD / sum(ratios)
-    figure = style.sheet(width, tall + 1.6 + sum(sizes))
-    shape: dict[str, Any] = {"height_ratios": [tall, *sizes], "width_ratios": ratios}
-    grid = figure.add_gridspec(1 + len(sizes), len(ratios), **shape)
+    figure = style.sheet(BROAD if globe else 9.6, TALL + 1.6 + sum(sizes))
+    grid = figure.add_gridspec(1 + len(sizes), 2 + globe, height_ratios=[TALL, *sizes])
     first = figure.add_subplot(grid[0, 0])
     if box is None:
         _pole_curve(first, flight, track)
@@ -168,9 +153,8 @@ def motion(flight: Flight, track: Track) -> Figure:
     """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig.
     5-8).
     """
-    wide = geometry.momentum_inset(flight, track) is not None
-    figure = style.sheet(9.6 if wide else 7.4, 4.1)
-    pole, sky = figure.subplots(1, 2, width_ratios=[1.0, ROOM if wide else 1.0])
+    figure = style.sheet(7.4, 4.1)
+    pole, sky = figure.subplots(1, 2)
     _pole_curve(pole, flight, track)
     _axis_track(sky, flight, track)
     return figure
@@ -191,38 +175,18 @@ def _pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
 def _axis_track(
     axes: Axes, flight: Flight, track: Track, outlines: Mapping[str, Vector] = NO_OUTLINES
 ) -> None:
-    """Path of the spin axis about the first H, as angles, and of H, in an inset if small (Magnus
-    1970 fig. 6-8), with ``outlines`` of where H may end.
+    """Path of the spin axis about the first H, as angles, and of H (Magnus 1970 fig. 6-8), with
+    ``outlines`` of where H may end.
     """
     path, momentum = geometry.sky_paths(flight, track)
     target = geometry.sky_target(flight, track)
-    small = geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)
     places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     style.target(axes, target)
     for name, outline in outlines.items():
         axes.plot(*outline.T, **ACCEPTED[name])
-    middle, half = style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
-    if small is None:
-        style.add(axes, "H", places[0], TURNED, role="vital")
-    else:
-        ticks = [tick for tick in axes.get_xticks() if abs(tick - middle[0]) <= half]
-        axes.set_xlim(middle[0] - half, middle[0] + (2.0 * ROOM - 1.0) * half)
-        axes.set_xticks(ticks)
-        inset = axes.inset_axes(INSET)
-        stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
-        for number in style.thinned(len(stations) - 1, NUMBERED):
-            style.add(inset, str(number + 1), stations[number + 1], FIRED)
-        style.add(inset, "t = 0", stations[0], INK, role="vital")
-        style.target(inset, target)
-        style.square(inset, small, margin=0.25)
-        inset.locator_params(nbins=3)
-        inset.tick_params(labelsize=style.SMALL)
-        much = min(INSET[2] * ROOM, INSET[3]) * float(
-            np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim())
-        )
-        inset.set_title(f"H after each firing (× {much:.2g})", **style.NOTE)
-        axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
+    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
+    style.add(axes, "H", places[0], TURNED, role="vital")
     x, y, sense = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
 
@@ -440,8 +404,8 @@ def course(flight: Flight, track: Track, *, outlines: Mapping[str, Vector], narr
     """Axis track above nutation, firings and changing spin; ``narrow``: for a phone."""
     courses = _courses(flight, track, rates=False)
     sizes = [*courses.values()]
-    figure = style.sheet(style.PHONE if narrow else 5.2, 5.0 + sum(sizes))
-    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.6, *sizes])
+    figure = style.sheet(style.PHONE if narrow else 5.2, 4.4 + sum(sizes))
+    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.4, *sizes])
     _axis_track(figure.add_subplot(grid[0]), flight, track, outlines)
     _draw_courses(figure, [grid[row + 1] for row in range(len(sizes))], flight, track, courses)
     return figure

@@ -296,7 +296,7 @@ OTHERS = (TURNED, INK, FIRED, GREY)  # colours of the schemes that are not recom
 def acceptance_figure(
     judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
 ) -> Figure:
-    """The box of `acceptance`, for the report and ``plan --figure acceptance``."""
+    """The box of `acceptance`, for the report and ``plan --figure box``."""
     figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
     acceptance(figure.subplots(), judged, others)
     style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
@@ -338,7 +338,8 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
             nominal = _nominal(verdict, bounds)
             place = np.minimum(nominal, ends)
             mark = "^" if beyond[1] else ">"
-            name += f": {_in_words(bounds[row], nominal[row])}"
+            unit = " rpm" if bounds[row].part is Part.SPIN else "°"
+            name += f": {style.number(nominal[row])}{unit}"
         else:
             place = region[-1]
             mark = "o"
@@ -419,10 +420,6 @@ def _contender(verdict: Verdict) -> str:
 def _in_units(bound: Bound, value: float) -> float:
     """A value of a bound's part in deg, of the spin in rpm."""
     return RPM * value if bound.part is Part.SPIN else math.degrees(value)
-
-
-def _in_words(bound: Bound, value: float) -> str:
-    return f"{style.number(value)}{' rpm' if bound.part is Part.SPIN else '°'}"
 
 
 def _bound_axis(bound: Bound) -> str:

@@ -407,29 +407,23 @@ NO_ROOM, ON_MARK = 1000.0, 10.0
 """Cost of a place on another label or outside the panel, and on a mark; on a line it is 1."""
 
 
-def panels(figure: Figure) -> list[Axes]:
-    """The panels of a figure, and those inset in them."""
-    inset: list[Any] = [panel for axes in figure.axes for panel in axes.child_axes]
-    return [*figure.axes, *inset]
-
-
 def settle(figure: Figure) -> None:
     """Lay out the panels, and each label where it covers least; take out those for which there is
     no room.
     """
-    for axes in panels(
-        figure
+    for axes in (
+        figure.axes
     ):  # drawn later outside this style, as many ticks fit between labels of the same size
         axes.tick_params(labelsize=TICK_SIZE)
         # They lie within the panel and its ticks.
         axes.spines[["left", "right", "top"]].set_in_layout(False)
-        for artist in (*axes.texts, *axes.child_axes):
+        for artist in axes.texts:
             artist.set_in_layout(False)
     for _ in range(PASSES):
         figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
     figure.draw_without_rendering()
     figure.set_layout_engine(None)  # labels are put where panels are now
-    for axes in panels(figure):
+    for axes in figure.axes:
         notes: list[Any] = [
             note for role in OFFSETS for note in axes.texts if note.get_label() == role
         ]

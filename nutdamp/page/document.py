@@ -26,51 +26,37 @@ if TYPE_CHECKING:
 
 
 class Cell(NamedTuple):
-    """Text of a cell, flush right for a ``number``; place of its ``dot`` in % of the largest
-    number; ``bar``, %.
-    """
+    """Text of a cell, flush right for a ``number``; ``bar``, %."""
 
     text: str
     number: bool
-    dot: float | None = None
     bar: float | None = None
 
 
 class Sheet(NamedTuple):
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to
-    scale, ``bars``: a bar each percentage; ``folds``: on a phone each row is a list of its own.
+    ``mark`` is the row to stand out; ``bars``: names of columns in which a bar shows each
+    percentage; ``folds``: on a phone each row is a list of its own.
     """
 
     title: str
     columns: tuple[Heading, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
-    dots: tuple[str, ...] = ()
     folds: bool = False
     bars: tuple[str, ...] = ()
 
     @property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """Rows of cells."""
-        columns = []
-        for heading, texts in zip(self.columns, zip(*self.rows, strict=True), strict=False):
-            dotted, barred = heading.name in self.dots, heading.name in self.bars
-            sizes = [*map(number_in, texts)]
-            largest = max((abs(size) for size in sizes if size is not None), default=0.0) or 1.0
-            shown = [
-                None if size is None or not dotted else 100.0 * abs(size) / largest
-                for size in sizes
-            ]
-            cells = zip(texts, shown, sizes, strict=True)
-            columns.append(
-                [
-                    Cell(text, heading.number, dot, bar if barred else None)
-                    for text, dot, bar in cells
-                ]
+        return tuple(
+            tuple(
+                Cell(text, column.number, number_in(text) if column.name in self.bars else None)
+                for column, text in zip(self.columns, row, strict=False)
             )
-        return tuple(zip(*columns, strict=True))
+            for row in self.rows
+        )
 
 
 class FactList(NamedTuple):

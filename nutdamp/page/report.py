@@ -210,10 +210,6 @@ def made_of(
     return Report(compared, page, page_html(page))
 
 
-DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis error")
-"""Columns of the comparison of schemes in which dots show the numbers to scale."""
-
-
 class Repeat(NamedTuple):
     """Data to make the page again: the command, and the input file by name and text.
 
@@ -345,6 +341,8 @@ def _sections(
     chosen = compared.recommended
     dispersed = _cases_of(compared)
     yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
+    if chosen is not None:
+        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
     if dispersed is not None:
         yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
     if traded:
@@ -354,8 +352,6 @@ def _sections(
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
         entries = [(name, text) for name, text in identity if text]
         blocks = manoeuvre_blocks(chosen, judged, entries, page.summary)
-        # Before the sheet, which is a page of its own in print: one line after it would be another.
-        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
         yield PageSection("manoeuvre", title, tuple(blocks))
     yield PageSection("background", "Background", tuple(_background(compared, judged, repeat)))
 
@@ -417,7 +413,7 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
     """
     yield Prose(sentence(joined(reasons(compared))))
     chosen = compared.recommended
-    yield document.sheet(scheme_table(compared, chosen), dots=DOTS)
+    yield document.sheet(scheme_table(compared, chosen))
     rows = [("", note) for note in more_notes]
     for plan in compared.plans:
         if plan.feasible and plan is not chosen:
@@ -516,8 +512,8 @@ PICTURES = {
         "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
     ),
     "acceptance": (
-        "A scheme whose contour lies in the grey box keeps both limits in enough cases; a dashed "
-        "one does not comply. Schemes far outside are arrows at the edge.",
+        "A scheme whose point, or whole contour, lies in the grey box keeps both limits. Dashed: "
+        "too few cases comply. Schemes far outside are arrows at the edge.",
         "Acceptance box: nutation left against the tightest other limit, one contour a scheme",
     ),
     "trade": (

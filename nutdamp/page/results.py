@@ -148,7 +148,7 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     if isinstance(result, Plan):
         assert judged is not None
         feasible(result)
-        if name == "acceptance":
+        if name == "box":
             return studies.acceptance_figure(judged, others)
         box = partial(studies.acceptance, judged=judged, others=others)
         flight, track = overview.shown(result)
@@ -161,7 +161,7 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     try:
         return overview.flight_figure(named, flight, track, judged, box)
     except KeyError:
-        names = [*overview.DRAWN] if box is None else [*overview.DRAWN, "acceptance"]
+        names = [*overview.DRAWN] if box is None else [*overview.DRAWN, "box"]
         raise BadRequest(
             f"there is no figure {name!r}; expected one of {', '.join(names)}"
         ) from None

@@ -114,7 +114,7 @@ def sun() -> None:
 def picture() -> None:
     """Draw the acceptance box of the built-in example, in a folder where no spacecraft.yaml is."""
     command = (sys.executable, "-m", "nutdamp", "plan")
-    drawing = ("--plot", str(FOLDER / "acceptance.png"), "--figure", "acceptance")
+    drawing = ("--plot", str(FOLDER / "acceptance.png"), "--figure", "box")
     with TemporaryDirectory() as empty:
         subprocess.run([*command, *drawing], cwd=empty, check=True)
 

@@ -7,7 +7,6 @@ import re
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -661,23 +660,6 @@ def test_many_turns_are_drawn_thin() -> None:
             next(line.get_linewidth() for line in space.lines if line.get_label() == "path")
         )
     assert widths[0] > widths[1] > widths[2]
-
-
-@pytest.mark.deep
-def test_where_h_moves_little_it_is_shown_enlarged() -> None:
-    body, space = drawn("motion", "120 pulses").axes
-    inset: Any = space.child_axes[0]
-    _, momentum = geometry.sky_paths(*flown("120 pulses"))
-    (left, right), (low, high) = inset.get_xlim(), inset.get_ylim()
-    assert ((momentum >= [left, low]) & (momentum <= [right, high])).all()
-    much = present(re.search(r"× ([\d.]+)", inset.get_title()))
-    widths = [
-        panel.get_window_extent().width / np.ptp(panel.get_xlim()) for panel in (inset, space)
-    ]
-    ratio = widths[0] / widths[1]
-    assert ratio > 5.0
-    assert float(much[1]) == pytest.approx(ratio, rel=0.06)
-    assert body.get_aspect() == inset.get_aspect() == 1.0
 
 
 # --- nothing overlaps, nothing is cut, all is seen

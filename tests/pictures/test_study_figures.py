@@ -35,11 +35,12 @@ from nutdamp.common.results import note
 from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults, loop_study
 from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.figures import studies, style
+from nutdamp.figures import geometry, studies, style
 from nutdamp.figures.overview import BAR
 from nutdamp.figures.signals import loop_figure, time_unit, upkeep
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.page.report import dispersion_picture
+from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
 from nutdamp.planning.decision import compare
@@ -393,10 +394,26 @@ def test_a_contour_lies_in_the_box_where_enough_cases_keep_both_limits(
     assert inside.mean() >= results.probability
 
 
+@pytest.mark.parametrize("which", ["shift", weekly("target")])
+def test_h_may_end_about_its_goal_and_its_contour_holds_the_cases(which: str) -> None:
+    verdict = study(which).verdict
+    flight = present(verdict.flight)
+    outlines = studies.accepted(flight, verdict)
+    start = verdict.spacecraft.momentum
+    goal = start if which == "shift" else present(verdict.spacecraft.goal.axis)
+    directions = geometry.off_sky(geometry.sky_plane(flight, start), outlines["limit"])
+    away = np.degrees(angle_between(directions, goal))
+    assert away == pytest.approx(np.full(len(away), math.degrees(present(REQUIRED.momentum_shift))))
+    if which == "shift":  # about the H(0) of each case, which is the centre
+        points = studies.momentum_cases(study(which).core)
+        held = studies.ellipse(points, study(which).core.probability)
+        assert outlines["contour"] == pytest.approx(held, abs=1e-9)
+
+
 @pytest.mark.deep
 def test_the_acceptance_box_names_every_scheme_with_cost_and_share() -> None:
     compared = compare(BODY, samples=2_048)
-    figure = compared.figure("acceptance")
+    figure = compared.figure("box")
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
@@ -413,7 +430,7 @@ def test_the_acceptance_box_names_every_scheme_with_cost_and_share() -> None:
 def test_without_cases_schemes_are_points_and_a_missing_limit_is_no_edge() -> None:
     free = replace(BODY, dispersions=None, requirement=Requirement(math.radians(0.5)))
     compared = compare(free, ["one-pulse", "two-pulse"])
-    (axes,) = compared.figure("acceptance").axes
+    (axes,) = compared.figure("box").axes
     assert axes.get_ylabel() == "momentum shift, ° (no limit)"
     dots = [np.asarray(one.get_xydata())[0] for one in axes.lines if one.get_marker() == "o"]
     shifts = [math.degrees(plan.flight.residual.momentum_shift) for plan in compared]

@@ -277,7 +277,7 @@ def test_commands_of_a_page_fly_the_spacecraft_of_its_own(
 ) -> None:
     crafts: list[str] = []
 
-    def view(_: object, craft: str) -> Prose:
+    def view(_: object, craft: str, outlines: object) -> Prose:
         crafts.append(craft)
         return Prose("")
 

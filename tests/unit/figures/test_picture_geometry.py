@@ -177,6 +177,15 @@ def test_distances_from_h_are_angles() -> None:
     )
 
 
+def test_angles_on_the_sky_are_directions_and_back() -> None:
+    made, track = flown(BODIES["disc"])
+    plane = geometry.sky_plane(made, track.momentum[0])
+    angles = np.array([[0.0, 0.0], [3.0, -4.0], [-60.0, 80.0], [1e-9, 0.0], [0.0, 179.0]])
+    directions = geometry.off_sky(plane, angles)
+    assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(len(angles)))
+    assert geometry.on_sky(plane, directions) == pytest.approx(angles, abs=1e-9)
+
+
 # --- rows
 # --------------------------------------------------------------------------------------------------
 

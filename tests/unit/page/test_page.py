@@ -238,14 +238,6 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
         ("", None),
     ):
         assert number_in(text) == value
-    made = Sheet(
-        "a", (Heading("b"), Heading("c", "s")), (("1", "4"), ("2", "1"), ("3", "–")), dots=("c",)
-    )
-    assert [[cell.dot for cell in row] for row in made.cells] == [
-        [None, 100.0],
-        [None, 25.0],
-        [None, None],
-    ]
     shares = Sheet(
         "a", (Heading("b"), Heading("c", "%")), (("1", "40.4"), ("2", "bias")), bars=("c",)
     )
@@ -738,6 +730,7 @@ def test_configuration_control_is_written_as_given() -> None:
     given = {"document": "ND-7", "issue": '2 "b"', "author": "M. Ö", "date": "2026-03-01"}
     controlled = ace(title="ACE <1>", **given)
     assert controlled.all("h1")[0].text == "ACE <1>"
+    assert ace(title="Slew 2").all("h1")[0].text == "ACE · Slew 2", "the name stays"
     digest = hashlib.sha256(ACE.read_bytes()).hexdigest()
     for node, expected in ((controlled, 'ND-7 iss 2 "b" · M. Ö · 2026-03-01 · '), (ace(), "")):
         (line,) = (one.text for one in node.all("p") if one.attributes.get("class") == "control")
@@ -805,6 +798,20 @@ def test_the_top_of_the_page_has_the_bounds_of_the_screen(
         label, *texts = re.split(r"  +", line)
         assert shown.pop(label) == texts
     assert shown == {}
+
+
+@pytest.mark.parametrize("scheme", ["two-pulse", "optimal"])
+def test_the_first_screen_lists_up_to_eight_pulses_else_the_first_and_the_last(
+    scheme: str,
+) -> None:
+    compared = compared_text(example_text(), (scheme,), None)
+    made = plain_page(compared)
+    pulses = present(compared.recommended).pulses
+    shown = present(made.pulses).rows
+    assert [row[0] for row in shown] == ["1", str(len(pulses))]
+    assert made.count == len(pulses)
+    link = f'The first and the last of {len(pulses)}; all are on the <a href="#manoeuvre">'
+    assert (link in page_html(made)) == (len(pulses) > 8) == (scheme == "optimal")
 
 
 @pytest.mark.weekly
