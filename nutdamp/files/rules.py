@@ -426,7 +426,7 @@ def _disturbances(facts: Facts) -> Iterator[Finding]:
         across = facts.value(*path[:-1], "kind") in (None, "constant", "rotating")
         if across and facts.number("torque", *path) is not None:
             problem = "expected three components, [M1, M2, M3], got a single torque"
-            yield Finding(path, f"{problem}; or, for a torque about axis 3 only, kind: axial")
+            yield Finding(path, f"{problem}; or kind: axial, along the third axis of the file")
 
 
 def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
