@@ -85,7 +85,7 @@ def page_of(text: str) -> dict[str, Any]:
     return {
         "status": headline[1],
         "sentence": sentence and sentence[1],
-        "met": re.findall(r"<td>((?:NOT )?met)</td></tr>", bars[0] if bars else ""),
+        "met": re.findall(r"<td[^>]*>((?:NOT )?met)</td></tr>", bars[0] if bars else ""),
         "signed": "Signatures" in text,
         "refused": "NOT FOR FLIGHT" in text,
     }
