@@ -355,7 +355,8 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
             outline = np.vstack([region, region[:1]])
             axes.plot(*outline.T, color=colour, linestyle=solid, linewidth=1.5)
             far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
-            style.add(axes, name, np.minimum(far, 0.97 * ends), colour, role="vital")
+            written_in = INK if recommended else colour  # on its own fill
+            style.add(axes, name, np.minimum(far, 0.97 * ends), written_in, role="vital")
     for spot, names in labels.items():
         style.add(axes, "\n".join(reversed(names)), np.array(spot), INK, role="vital")
     across, along = map(_bound_axis, bounds)

@@ -187,7 +187,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
     image.film(stream, made, timed, "a.gif", 401)
     assert done == list(range(1, 9))
     picture = Image.open(stream)
-    assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
+    assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 300), 8)
     assert (picture.info["duration"], picture.info["loop"]) == (50, 0)
     scene = style.styled()(Scene)(made, timed, 401)
     frames = []
