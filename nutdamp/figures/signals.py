@@ -168,6 +168,7 @@ LOOKS = tuple(
 )
 """Colour and line of the signals in turn."""
 
+ROWS = 8  # labels of pulls that fit into half of the height
 FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 
@@ -183,7 +184,9 @@ def fit_figure(fitted: Fitted) -> Figure:
     shown = [index for index in every if not _rounding(fit, index)] or [0]
     exact = [name for index, name in enumerate(fit.model.signals) if index not in shown]
     pulled = [row for row in estimates(fit, 0.0) if row.change is not None and row.prior]
-    correlated = [index for index in shown if len(fit.whiteness(index))]
+    correlated = [
+        index for index in shown if len(fit.whiteness(index)) and not _rounding(fit, index)
+    ]
     aside = bool(correlated) + bool(pulled)
     figure = style.sheet(8.6 if aside else 5.4, max(4.8, 1.2 + 1.15 * len(shown)))
     sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0 if aside else 1e-3])
@@ -197,7 +200,10 @@ def fit_figure(fitted: Fitted) -> Figure:
         left[-1].set_xlabel(f"{TIME}\nonly rounding: {', '.join(exact)}")
     right: list[Axes] = []
     if aside:
-        right = sides[1].subgridspec(aside, 1).subplots(squeeze=False)[:, 0].tolist()
+        rows = max(1.0, len(pulled) / ROWS)
+        heights = [1.0] * (aside - 1) + [rows if pulled else 1.0]
+        beside = sides[1].subgridspec(aside, 1, height_ratios=heights)
+        right = beside.subplots(squeeze=False)[:, 0].tolist()
     if correlated:
         _autocorrelation(right[0], fit, correlated)
     if pulled:
