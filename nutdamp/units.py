@@ -132,6 +132,8 @@ LARGEST_SEED = 2**64 - 1
 _QUANTITY = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL
 )
+_EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+")
+"""A number of YAML 1.2, such as 42e-3, that ``yaml.safe_load``, of YAML 1.1, leaves a text."""
 _DECIMAL_COMMA = re.compile(r"[^,.]*[0-9],[0-9][^,.]*")
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
@@ -206,7 +208,7 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     number = float(match[1])
     unit = re.sub(r"\s+", " ", match[2])
-    if not unit and bare:
+    if not unit and (bare or _EXPONENT.fullmatch(text)):
         return number, 1.0
     if not expected.factors:
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")

@@ -10,6 +10,7 @@ values. `motion_edits` are the values of a later moment, by which a file is carr
 from __future__ import annotations
 
 import ast
+import datetime
 import json
 import math
 import re
@@ -98,7 +99,7 @@ def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Itera
     BadRequest.
     """
     if len(behind) >= MAX_DEPTH:
-        raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
+        raise BadRequest(f"with_ {dotted(behind[:1])}: nested more than {MAX_DEPTH} levels deep")
     for key, value in values.items():
         if not isinstance(key, str):
             raise BadRequest(
@@ -207,24 +208,33 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
 
 
-def _of_python(value: object, place: Place, depth: int = 0) -> Node:
-    """A Python value as part of a tree; raises BadRequest for a value that a file cannot hold."""
-    if depth > MAX_DEPTH:
-        raise BadRequest(f"{place}: nested more than {MAX_DEPTH} levels deep")
+def _of_python(value: object, place: Place, path: KeyPath = ()) -> Node:
+    """A Python value, at ``path``, as part of a tree; raises BadRequest for one that a file cannot
+    hold.
+
+    Dates and times are the texts that ``yaml.safe_load`` made them of.
+    """
+    if len(path) > MAX_DEPTH:
+        raise BadRequest(f"{place}: {dotted(path[:1])}: nested more than {MAX_DEPTH} levels deep")
     if value is None or isinstance(value, str | bool | int | float):
         return Node(value, place)
+    if isinstance(value, datetime.date):
+        return Node(value.isoformat(), place)
     if isinstance(value, Integral):
         return Node(int(value), place)
     if isinstance(value, Real):
         return Node(float(value), place)
     if isinstance(value, Mapping):
-        below = {str(key): _of_python(child, place, depth + 1) for key, child in value.items()}
+        below = {
+            str(key): _of_python(child, place, (*path, str(key))) for key, child in value.items()
+        }
         return Node(below, place, dict.fromkeys(below, place))
     if isinstance(value, Iterable):
-        return Node([_of_python(child, place, depth + 1) for child in value], place)
-    raise BadRequest(
-        f"{place}: expected a number, a text, a list or a mapping, got {type(value).__name__}"
-    )
+        entries = [_of_python(child, place, (*path, row)) for row, child in enumerate(value)]
+        return Node(entries, place)
+    where = ": ".join(filter(None, (str(place), dotted(path))))
+    expected = "a number, a text, a date, a list or a mapping"
+    raise BadRequest(f"{where}: expected {expected}, got {type(value).__name__}")
 
 
 def edited(

@@ -14,15 +14,18 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from datetime import date, datetime, timedelta, timezone
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 from support import places
 from support.builders import present
+from support.cases import spread
 from support.golden import check_text, refusal, refused
 from support.process import Run
 from support.shown import parsed
@@ -203,6 +206,53 @@ def test_a_dict_is_read_as_the_file_is() -> None:
     assert nutdamp.example("ace").name == "ACE"
     with refused(errors.FaultyFile, "library.faulty-dict"):
         nutdamp.load({"nam": "X", "inertia": {"A": "120 s", "C": 80}, "omega0": [0, 0, 3]})
+
+
+@spread("path", sorted(places.CONFIGS.glob("*.yaml")), quick=6, deep=13)
+def test_what_yaml_makes_of_a_file_is_read_as_the_file(path: Path) -> None:
+    """Moments and numbers such as 42e-3, too."""
+    text = path.read_text(encoding="utf-8")
+    assert nutdamp.load(yaml.safe_load(text)).to_dict() == nutdamp.read(text).to_dict()
+
+
+@pytest.mark.parametrize(
+    ("moment", "epoch"),
+    [
+        (datetime(2026, 3, 1, 12, 0), "2026-03-01T12:00:00"),
+        (
+            datetime(2026, 3, 1, 13, 30, 0, 500, timezone(timedelta(hours=1.5))),
+            "2026-03-01T12:00:00.0005Z",
+        ),
+    ],
+)
+def test_moments_of_python_are_epochs_in_utc(moment: datetime, epoch: str) -> None:
+    timed, written = (
+        {"quaternion": [1, 0, 0, 0], "epoch": at, "frame": "EME2000"} for at in (moment, epoch)
+    )
+    expected = CRAFT.with_(attitude=written).utc(10.0)
+    assert nutdamp.load({**KEYS, "attitude": timed}).utc(10.0) == expected
+    assert CRAFT.with_(attitude=timed).utc(10.0) == expected
+    assert nutdamp.load(KEYS, set={"attitude": timed}).utc(10.0) == expected
+    assert nutdamp.load({**KEYS, "name": moment.date()}).name == "2026-03-01"
+
+
+def test_each_refusal_of_a_value_names_its_key() -> None:
+    nested: list[object] = []
+    nested.append(nested)
+    messages = [
+        refusal(nutdamp.NutdampError, call)
+        for call in [
+            lambda: LIB.load({**KEYS, "mass": object()}),
+            lambda: LIB.load({**KEYS, "thrusters": [{"name": "T1", "force": 1 + 2j}]}),
+            lambda: LIB.load({**KEYS, "limits": {"blackout": nested}}),
+            lambda: LIB.load({**KEYS, "attitude": {"epoch": date(2026, 3, 1)}}),
+            lambda: LIB.load(KEYS, set={"mass": 1j}),
+            lambda: LIB.load(KEYS, set={"limits.blackout": [[1, object()]]}),
+            lambda: CRAFT.with_(limits={"blackout": [[1, ...]]}),
+            lambda: LIB.load({**KEYS, "mass": "5"}),
+        ]
+    ]
+    check_text("library.keys-named", "\n".join(messages))
 
 
 def test_with_changes_the_keys_named_and_no_others(tmp_path: Path) -> None:
