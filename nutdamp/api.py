@@ -53,6 +53,8 @@ if TYPE_CHECKING:
 
 PathName = str | PathLike[str]
 
+Target = str | Iterable[float | str]
+
 Progress = Callable[
     [int, int], None
 ]  # called now and then with the number of steps done, and that of all
@@ -140,6 +142,16 @@ def _expected(spacecraft: Spacecraft) -> Spacecraft:
     )
 
 
+def _aimed(spacecraft: Spacecraft, target: Target | None, spin: float | str | None) -> Spacecraft:
+    """Spacecraft with a goal beside its file; raises BadRequest, and warns as the command line."""
+    _expected(spacecraft)
+    if target is None and spin is None:
+        return spacecraft
+    from nutdamp.files.reader import aimed
+
+    return aimed(spacecraft, warn, target=target, spin=spin)
+
+
 def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
     """Names of schemes that there are, each once; raises BadRequest."""
     several = isinstance(values, Iterable) and not isinstance(values, str)
@@ -172,7 +184,13 @@ def _expect_options(
 
 
 def plan(
-    spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any
+    spacecraft: Spacecraft,
+    scheme: str | None = None,
+    options: Choice = None,
+    *,
+    target: Target | None = None,
+    spin: float | str | None = None,
+    **chosen: Any,
 ) -> Plan:
     """Plan one scheme, or the recommended one, and judge it by flying it; an infeasible plan says
     why.
@@ -187,6 +205,9 @@ def plan(
     options, chosen
         `Options` of several schemes or those of one, or their fields by keyword, in SI:
         ``on_time=0.2`` (s).
+    target, spin
+        Goal in place of that of the file, as ``--target`` and ``--spin`` take it: ``"10deg,45deg"``
+        or two numbers in rad; ``"30rpm"``, ``"keep"`` or a number in rad/s.
 
     Examples
     --------
@@ -197,7 +218,7 @@ def plan(
     """
     from nutdamp.planning import plan as planning
 
-    spacecraft = _expected(spacecraft)
+    spacecraft = _aimed(spacecraft, target, spin)
     named = None if scheme is None else _expect_names([scheme])[0]
     settled = _expect_options(options, chosen, named)
     if named is not None:
@@ -216,6 +237,8 @@ def compare(
     samples: int | None = None,
     timed: bool = False,
     robust: bool = True,
+    target: Target | None = None,
+    spin: float | str | None = None,
     **chosen: Any,
 ) -> Comparison:
     """Plan schemes, compare them and recommend one, as ``nutdamp plan`` does.
@@ -225,8 +248,8 @@ def compare(
     names
         Schemes, default the classic three and optimal, or those that point where the file has a
         target axis.
-    options, chosen
-        As of `plan`; each scheme takes those that it has.
+    options, target, spin, chosen
+        As of `plan`; each scheme takes the options that it has.
     samples, timed
         Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values
         alone; recommend pulses
@@ -243,7 +266,7 @@ def compare(
     """
     from nutdamp.planning import decision
 
-    spacecraft = _expected(spacecraft)
+    spacecraft = _aimed(spacecraft, target, spin)
     schemes = _expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
     chosen_options = _expect_options(options, chosen)
@@ -258,7 +281,7 @@ def compare(
 
 
 def robust(
-    compared: Comparison,
+    spacecraft: Spacecraft | Comparison,
     options: Options | None = None,
     *,
     progress: Progress = lambda _done, _all: None,
@@ -270,9 +293,9 @@ def robust(
 
     Parameters
     ----------
-    compared
-        The comparison of `compare`: its plans are among the candidates. ``options``: those that it
-        was made with.
+    spacecraft, options
+        Of `load`, or a comparison of `compare`, whose plans are among the candidates, with the
+        options that it was made with.
     progress
         Called with the number of attempts made, and that of all.
 
@@ -283,11 +306,16 @@ def robust(
     """
     from nutdamp.planning import robust as search
     from nutdamp.planning.decision import Comparison
+    from nutdamp.spacecraft.model import Spacecraft
     from nutdamp.spacecraft.tolerances import expect_dispersions
 
-    expect_dispersions(
-        units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions
-    )
+    fits = isinstance(spacecraft, Spacecraft | Comparison)
+    units.expect(fits, "spacecraft", spacecraft, "a Spacecraft or a Comparison")
+    compared = spacecraft if isinstance(spacecraft, Comparison) else None
+    body = spacecraft.spacecraft if isinstance(spacecraft, Comparison) else spacecraft
+    expect_dispersions(body.dispersions)
+    if compared is None:
+        compared = compare(body, options=options, robust=False)
     return search.compare(compared, options, progress=progress)
 
 

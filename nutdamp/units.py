@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from os import PathLike, fspath
 from types import UnionType
-from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from nutdamp.errors import BadRequest
 
@@ -134,6 +134,7 @@ _QUANTITY = re.compile(
 )
 _EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+")
 """A number of YAML 1.2, such as 42e-3, that ``yaml.safe_load``, of YAML 1.1, leaves a text."""
+_PLAIN = re.compile(r"\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*")
 _DECIMAL_COMMA = re.compile(r"[^,.]*[0-9],[0-9][^,.]*")
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
@@ -160,6 +161,58 @@ _UNITS = [
     for unit, factor in kind.factors.items()
 ]
 """Spellings of each unit, its kind and its factor to SI."""
+
+
+class Bare(float):
+    """A number that was written without a unit."""
+
+
+class Angles(NamedTuple):
+    """Two angles in rad that name a direction."""
+
+    first: float
+    second: float
+
+    @property
+    def readings(self) -> tuple[str, ...]:
+        """Readings of unitless numbers that are likely degrees: whole, and more than a turn."""
+        doubtful = [
+            angle
+            for angle in self
+            if isinstance(angle, Bare)
+            if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
+        ]
+        return tuple(reading(angle, "angle", "deg") for angle in doubtful)
+
+
+def word(value: object, kind: str) -> float:
+    """SI value of a number, or of a word of a command line, `Bare` without a unit; raises
+    ValueError.
+    """
+    if isinstance(value, Bare):
+        return value
+    if not isinstance(value, str):
+        return parse(float(value) if is_number(value) else value, kind)  # type: ignore[arg-type]
+    number = parse(value, kind, bare=True)
+    return Bare(number) if _PLAIN.fullmatch(value) else number
+
+
+def angles(value: object, kind: str = "angle") -> Angles:
+    """Two angles in a sequence, or in a text with a comma between them, the first of a ``kind``;
+    raises ValueError.
+    """
+    if isinstance(value, Angles):
+        return value
+    parts = list[object]()
+    point = ""
+    if isinstance(value, str):
+        parts = [part.strip() for part in value.split(",")]
+        point = "; decimals take a point" if len(parts) > 2 else ""
+    elif isinstance(value, Iterable):
+        parts = [*value]
+    if len(parts) != 2:
+        raise ValueError(f"{shown(value)} is not two angles, such as 10deg,45deg{point}")
+    return Angles(word(parts[0], kind), word(parts[1], "angle"))
 
 
 def parse(value: object, kind: str, *, bare: bool = False) -> float:

@@ -35,8 +35,6 @@ from nutdamp.cli.options import (
     FILE,
     FOLDER,
     OUTPUT,
-    Angles,
-    Bare,
     Command,
     Count,
     Direction,
@@ -49,7 +47,7 @@ from nutdamp.cli.plan import compared_with, scheme_option
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import CannotWrite, Infeasible, printable
 from nutdamp.schemes.catalogue import LEAST, NAMES, OPTIMAL, SchemeOptions
-from nutdamp.units import LARGEST_SEED, reading, shifts, thresholds, tilt
+from nutdamp.units import LARGEST_SEED, Angles, Bare, reading, shifts, thresholds, tilt
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

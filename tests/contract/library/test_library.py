@@ -59,6 +59,8 @@ KEYS: dict[str, Any] = {
 }
 
 
+IN_SKY = {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
+
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 CRAFT = nutdamp.example()
@@ -167,6 +169,67 @@ def test_a_plan_is_of_the_scheme_named_or_the_recommended_one() -> None:
     by_keyword = nutdamp.plan(CRAFT, "four-pulse", on_time=0.2)
     assert by_keyword.to_dict() == nutdamp.plan(CRAFT, "four-pulse", Options(on_time=0.2)).to_dict()
     assert by_keyword.pulses[0].on_time == 0.2
+
+
+@pytest.mark.parametrize(
+    ("words", "goal"),
+    [
+        ("--target 10deg,45deg", {"target": "10deg,45deg"}),
+        ("--target 10deg,45deg", {"target": ("10 deg", math.radians(45.0))}),
+        ("--target 0.1745,1", {"target": np.array([0.1745, 1.0])}),
+        ("--spin 31.5rpm", {"spin": "31.5 rpm"}),
+        ("--spin 3.5", {"spin": np.float64(3.5)}),
+        ("--spin keep --target 0.2,0", {"spin": "keep", "target": (0.2, 0)}),
+    ],
+)
+def test_a_goal_is_given_as_on_the_command_line(run: Run, words: str, goal: dict[str, Any]) -> None:
+    shown = run(*f"plan -q --nominal --scheme two-pulse {words} --json -".split(), status=None)
+    compared = nutdamp.compare(CRAFT, ["two-pulse"], samples=0, **goal)
+    assert written(compared.to_dict()) == json.loads(shown.stdout)
+    (plan,) = compared
+    assert nutdamp.plan(CRAFT, "two-pulse", **goal).to_dict() == plan.to_dict()
+
+
+def test_a_goal_beside_the_file_is_doubted_and_refused_by_its_name() -> None:
+    calls: list[dict[str, Any]] = [
+        {"target": "10deg"},
+        {"target": "10,5deg,45deg"},
+        {"target": (1.0, 2.0, 3.0)},
+        {"target": 0.2},
+        {"target": ("200 deg", 0)},
+        {"target": ("1 s", 0)},
+        {"spin": "0rpm"},
+        {"spin": "fast"},
+        {"spin": -3},
+        {"spin": [3]},
+    ]
+    messages = [refusal(errors.BadRequest, LIB.plan, CRAFT, "none", **goal) for goal in calls]
+    check_text("library.goals-refused", "\n".join(messages))
+    with pytest.warns(UserWarning, match="^spin: 30 is read as 30 rad/s"):
+        nutdamp.plan(CRAFT, "none", spin="30")
+    with pytest.warns(UserWarning, match=r"^target: 10 is read as 10 rad \(573 deg\)"):
+        nutdamp.plan(CRAFT.with_(attitude=IN_SKY), "none", target="10,0")
+
+
+def test_a_plan_to_a_goal_beside_the_file_is_carried_on() -> None:
+    """With the goal of the file, as by ``-o``."""
+    plan = nutdamp.plan(CRAFT, "half-cone", target="10deg,45deg")
+    later = plan.carried()
+    assert later.goal.axis is None
+    assert nutdamp.plan(later, "none", target="10deg,45deg").spacecraft.goal.axis is not None
+
+
+@pytest.mark.deep
+def test_a_robust_plan_needs_no_comparison() -> None:
+    body = CALM.with_(
+        omega0=[0.1, 0, 3],
+        steerable={"torque": "40 N m"},
+        requirement={"nutation": "0.5 deg"},
+        dispersions={"thrust": {"normal": "5 %"}},
+    )
+    own, compared = nutdamp.robust(body), nutdamp.robust(nutdamp.compare(body, robust=False))
+    assert own.to_dict() == compared.to_dict()
+    assert own.verdict.met
 
 
 def test_there_is_one_type_of_each_name() -> None:
@@ -345,6 +408,7 @@ def test_a_wrong_argument_is_reported_with_what_was_expected() -> None:
             lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=1.0), on_time=0.2),
             lambda: LIB.simulate(planned(), -1.0),
             lambda: LIB.robust(planned()),
+            lambda: LIB.robust(CALM),
             lambda: LIB.loop(CRAFT),
             lambda: LIB.loop(nutdamp.example("upper-stage"), case=0),
             lambda: LIB.report(planned()),
