@@ -15,6 +15,7 @@ import sys
 import types
 from collections.abc import Callable
 from datetime import date, datetime, timedelta, timezone
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ from nutdamp.figures import style
 from nutdamp.files import schedules, tabular
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
+from nutdamp.montecarlo import study
 from nutdamp.montecarlo.inputs import list_inputs
 from nutdamp.page import report
 from nutdamp.planning import plan as planning
@@ -597,6 +599,68 @@ def test_arrays_and_data_frames_have_the_columns_of_files(
             made.to_pandas()
         with pytest.raises(ImportError):
             made.to_pandas()
+
+
+SCATTERED: dict[str, Any] = {
+    "dispersions": {"omega0": {"normal": "0.05 deg/s"}, "thrust": {"normal": "5 %"}},
+    "attitude": IN_SKY,
+    "sun": [0.0, 0.0],
+    "keep": [{"name": "Sun", "direction": "sun", "min": "1 deg"}],
+}
+
+
+@pytest.mark.parametrize("spin", [None, "keep"])
+def test_dispersed_cases_are_rows_of_their_file(
+    spin: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = nutdamp.plan(CRAFT.with_(**SCATTERED), "two-pulse", spin=spin)
+    flown = nutdamp.disperse(plan, 50, seed=3, csv=tmp_path / "own.csv")
+    cases = flown.to_numpy()
+    header, *rows = csv.reader(io.StringIO((tmp_path / "own.csv").read_text()))
+    assert cases.dtype.names == tuple(header)
+    assert cases["case"].tolist() == [*range(1, 51)]
+    assert [[str(cell) for cell in case] for case in cases.tolist()] == rows
+    assert ("spin_error_rad_s" in header, "Sun_least_deg" in header) == (spin is not None, True)
+    flown.to_csv(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "own.csv").read_bytes()
+    pandas = types.ModuleType("pandas")
+    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    assert tuple(flown.to_pandas()) == tuple(header)
+
+
+def test_percentiles_are_those_of_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = nutdamp.plan(CRAFT.with_(**SCATTERED), "two-pulse")
+    flown = nutdamp.disperse(plan, 3_000)
+    cases = flown.to_numpy()
+    levels = flown.percentiles([0, 2.5, 50, 100])
+    names = present(cases.dtype.names)
+    assert levels.dtype.names == ("percent", *names[names.index("nutation_deg") :])
+    for name in names[names.index("nutation_deg") :]:
+        assert levels[name] == pytest.approx(np.percentile(cases[name], levels["percent"]))
+    usual, shown = flown.percentiles(), flown.to_dict()["percentiles"]["propellant_kg"]
+    assert usual["propellant_kg"].tolist() == [shown[f"{level:g}"] for level in usual["percent"]]
+    assert flown.percentiles(50).tolist() == flown.percentiles([50]).tolist()
+    refusals = [
+        refusal(errors.BadRequest, flown.percentiles, wrong)
+        for wrong in (101, [-1], "50", [None], math.nan)
+    ]
+    check_text("library.levels", "\n".join(refusals))
+    monkeypatch.setattr(study, "EXACT_CASES", 2_000)  # beyond it cases are counted
+    counted = nutdamp.disperse(plan, 3_000)
+    for name in present(levels.dtype.names):
+        assert counted.percentiles(levels["percent"])[name] == pytest.approx(levels[name], rel=3e-3)
+    for refusing in (counted.to_numpy, partial(counted.to_csv, "cases.csv")):
+        with refused(errors.BadRequest, "library.cases-counted"):
+            refusing()
+
+
+def test_percentiles_of_what_is_not_known_are_none() -> None:
+    """An ideal torquer has no propellant."""
+    body = CALM.with_(omega0=[0.1, 0, 3], dispersions={"omega0": {"normal": "0.05 deg/s"}})
+    flown = nutdamp.disperse(nutdamp.plan(body, "two-pulse"), 50)
+    assert np.isnan(flown.percentiles()["propellant_kg"]).all()
+    assert np.isfinite(flown.percentiles()["nutation_deg"]).all()
 
 
 def test_the_track_is_in_the_axes_of_the_file() -> None:
