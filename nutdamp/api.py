@@ -147,7 +147,7 @@ def _aimed(spacecraft: Spacecraft, target: Target | None, spin: float | str | No
     _expected(spacecraft)
     if target is None and spin is None:
         return spacecraft
-    from nutdamp.files.reader import aimed
+    from nutdamp.files.editing import aimed
 
     return aimed(spacecraft, warn, target=target, spin=spin)
 

@@ -248,7 +248,7 @@ class Aim(NamedTuple):
 
     def applied(self, spacecraft: Spacecraft, doubt: Callable[[str], None]) -> Spacecraft:
         """The spacecraft with this goal; a usage error where it has none, a doubt if unlikely."""
-        from nutdamp.files.reader import aimed
+        from nutdamp.files.editing import aimed
 
         try:
             return aimed(spacecraft, lambda text: doubt(f"--{text}"), **self._asdict())

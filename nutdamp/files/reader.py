@@ -31,7 +31,7 @@ from typing import (
 import numpy as np
 
 from nutdamp import units
-from nutdamp.errors import Fault, FaultyFile, SenselessOption, in_order, nearest, warn
+from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files import keys
 from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
@@ -505,82 +505,6 @@ def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
         axis = spacecraft.at_sun_angle(section.sun_angle)
         return Goal(axis, section.spin, sun_angle=section.sun_angle)
     return Goal(spin=section.spin)
-
-
-def aimed(
-    spacecraft: Spacecraft,
-    doubt: Callable[[str], object],
-    *,
-    target: object = None,
-    spin: object = None,
-    sun: object = None,
-    sun_angle: float | None = None,
-) -> Spacecraft:
-    """Spacecraft with a goal given beside its file, for one command or call.
-
-    ``target``, ``sun``: two angles, see `units.angles`: right ascension and declination where the
-    file has an attitude, else tilt and azimuth in the frame N; ``spin``: a rate or ``keep``;
-    ``sun_angle``: rad, of a target from the Sun. ``doubt`` is called with the readings of numbers
-    that are hardly meant. Raises SenselessOption.
-    """
-    goal = spacecraft.goal
-    if target is not None:
-        axis = _direction(spacecraft, "target", target, doubt)
-        goal = replace(goal, axis=axis, sun_angle=None)
-    if sun_angle is not None:
-        problem = ""
-        if target is not None:
-            problem = "given together with --target; keep one of the two"
-        elif not 0.0 <= sun_angle <= math.pi:
-            readings = units.Angles(sun_angle, 0.0).readings
-            problem = "; ".join(("expected an angle of 0 to 180 deg", *readings))
-        elif spacecraft.sun is None:
-            problem = "needs the key sun of the file: [right ascension, declination], or sun: epoch"
-        if problem:
-            raise SenselessOption("sun_angle", shown(sun_angle), problem)
-        axis = spacecraft.at_sun_angle(sun_angle)
-        goal = replace(goal, axis=axis, sun_angle=float(sun_angle))
-    if sun is not None:
-        goal = replace(goal, sun=_direction(spacecraft, "sun", sun, doubt))
-    if spin is not None:
-        rate = spacecraft.spin
-        if not isinstance(spin, str) or spin != "keep":
-            rate = _argument("spin", spin, units.word, "rate")
-        if rate * spacecraft.spin <= 0.0:
-            problem = f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)"
-            raise SenselessOption("spin", shown(spin), problem)
-        if isinstance(rate, units.Bare) and (rate.is_integer() or abs(rate) > units.FASTEST):
-            doubt(f"spin: {units.reading(rate, 'rate', 'rpm')}")
-        goal = replace(goal, spin=rate)
-    result = replace(spacecraft, goal=goal)
-    object.__setattr__(result, "source", spacecraft.source)
-    return result
-
-
-def _direction(
-    spacecraft: Spacecraft, name: str, value: object, doubt: Callable[[str], object]
-) -> Vector:
-    """The unit vector (3,) that two angles name, inertial; raises SenselessOption where they name
-    none.
-    """
-    angles = _argument(name, value, units.angles, "right ascension")
-    in_sky = spacecraft.attitude is not None
-    if abs(angles.second) <= 0.5 * math.pi if in_sky else 0.0 <= angles.first < math.pi:
-        for reading in angles.readings:
-            doubt(f"{name}: {reading}")
-        return attitude.on_sphere(*angles) if in_sky else spacecraft.direction_in_n(*angles)
-    problem = "expected a declination of -90 deg to 90 deg"
-    if not in_sky:
-        problem = "expected a tilt of at least 0 and below 180 deg"
-    raise SenselessOption(name, shown(value), "; ".join((problem, *angles.readings)))
-
-
-def _argument(name: str, value: object, read: Callable[[object, str], Part], kind: str) -> Part:
-    """The value as ``read``; raises SenselessOption."""
-    try:
-        return read(value, kind)
-    except ValueError as wrong:
-        raise SenselessOption(name, shown(value), str(wrong)) from None
 
 
 def _sun(contents: keys.SpacecraftFile) -> Vector | None:

@@ -75,6 +75,7 @@ VIEWS = {
     "Fitted.data": "views.fit:fit_json",
     "Fitted.figure": "figures.signals:fit_figure",
     "Fit.text": "files.carried:fitted_text",
+    "Plan.simulated": "api:simulate",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
     "Verified.data": "views.simulation:verification_json",
@@ -109,7 +110,7 @@ def robust_data(robust: RobustComparison) -> dict[str, Any]:
 def _rows(result: Plan | Comparison) -> DataTable:
     if isinstance(result, Comparison):
         return scheme_table(result, result.recommended)
-    return pulse_table(result.flight)
+    return pulse_table(result._flight)
 
 
 def table(result: Plan | Comparison | Flight | Simulation) -> results.Table:
@@ -245,7 +246,7 @@ def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
         return FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
     if not result.feasible:
         return Prose(repr(result)[1:-1])
-    return sheet(pulse_table(result.flight, scheme=result.scheme))
+    return sheet(pulse_table(result._flight, scheme=result.scheme))
 
 
 def _summary(flight: Flight) -> str:

@@ -216,7 +216,7 @@ def unrounded(planned: Plan) -> Schedule | None:
     that planned it.
     """
     spacecraft = planned.spacecraft
-    schemed = planned.scheme in catalogue.SCHEMES and not planned.from_file
+    schemed = planned.scheme in catalogue.SCHEMES and not planned._from_file
     if spacecraft.limits.tick is None or not schemed:
         return None
     return plan(with_limits(spacecraft, tick=None), planned.scheme, planned.options).schedule

@@ -259,7 +259,7 @@ def test_every_residual_carries_the_name_of_its_model() -> None:
 
 def test_numbers_of_numpy_are_numbers() -> None:
     plan = nutdamp.plan(CRAFT, "four-pulse", Options(on_time=np.float64(0.5), per_turn=np.int64(2)))
-    assert max(plan.to_numpy()["on_time_s"]) == 0.5
+    assert max(np.asarray(plan)["on_time_s"]) == 0.5
     assert len(plan.fly(until=np.float64(3.0), samples=np.int64(5)).track.t) >= 5  # type: ignore[arg-type]
 
 
@@ -445,7 +445,7 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> No
         nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"), "four-pulse"
     )
     assert not infeasible.feasible
-    assert len(infeasible.to_numpy()) == len(infeasible) == 0
+    assert len(np.asarray(infeasible)) == len(infeasible) == 0
     calls: list[tuple[type[Exception], Call]] = [
         (errors.CannotRead, lambda: nutdamp.load(tmp_path / "missing.yaml")),
         (errors.FaultyFile, lambda: nutdamp.read("name: X\n")),
@@ -581,24 +581,55 @@ def test_arrays_and_data_frames_have_the_columns_of_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = nutdamp.plan(nutdamp.read(TILTED), "two-pulse")
-    pandas = types.ModuleType("pandas")
-    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    made: Any
     for made, header in ((plan, schedules.PULSES_HEADER), (plan.fly(samples=50), tabular.HEADER)):
-        array = made.to_numpy()
+        array = np.asarray(made)
         assert array.dtype.names == header
         made.to_csv(tmp_path / "rows.csv")
         rows = list(csv.reader(io.StringIO((tmp_path / "rows.csv").read_text())))[1:]
         for mine, row in zip(array.tolist(), rows, strict=True):
             assert [str(cell) for cell in mine] == [cell or "nan" for cell in row]
-        monkeypatch.setitem(sys.modules, "pandas", pandas)
-        frame = made.to_pandas()
-        assert tuple(frame) == header
-        assert all(np.array_equal(frame[name], array[name]) for name in header)
-        monkeypatch.setitem(sys.modules, "pandas", None)
-        with refused(nutdamp.NutdampError, "library.no-pandas"):
-            made.to_pandas()
-        with pytest.raises(ImportError):
-            made.to_pandas()
+    pandas = types.ModuleType("pandas")
+    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    flight = plan.fly(samples=50)
+    array, frame = flight.to_numpy(), flight.to_pandas()
+    assert tuple(frame) == array.dtype.names
+    assert all(np.array_equal(frame[name], array[name]) for name in frame)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with refused(nutdamp.NutdampError, "library.no-pandas"):
+        flight.to_pandas()
+    with pytest.raises(ImportError):
+        flight.to_pandas()
+
+
+PUBLIC = """
+spacecraft scheme schedule pulses options feasible why verdict notes meets_requirement propellant
+total_impulse end residual flown fly simulate carried to_dict to_csv figure
+"""
+
+
+def test_a_plan_has_few_names_and_the_former_ones_warn(monkeypatch: pytest.MonkeyPatch) -> None:
+    pandas = types.ModuleType("pandas")
+    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    plan = planned()
+    assert [name for name in dir(plan) if name[0] != "_"] == sorted(PUBLIC.split())
+    for name, cure in planning.FORMER.items():
+        with pytest.warns(DeprecationWarning, match=f"^{name} of a plan goes .*{re.escape(cure)}"):
+            former = getattr(plan, name)
+        own = getattr(plan, "notes" if name == "remarks" else f"_{name}")
+        assert former is own or repr(former) == repr(own), name
+    with pytest.warns(DeprecationWarning, match="to_numpy"):
+        assert np.array_equal(plan.to_numpy(), np.asarray(plan))
+    with pytest.warns(DeprecationWarning, match="to_pandas"):
+        assert tuple(plan.to_pandas()) == np.asarray(plan).dtype.names
+    with pytest.raises(AttributeError, match="'Plan' object has no attribute 'flights'"):
+        _ = plan.flights
+    assert (
+        plan.simulate(20.0, flown=True).to_dict()
+        == nutdamp.simulate(plan, 20.0, flown=True).to_dict()
+    )
 
 
 SCATTERED: dict[str, Any] = {
