@@ -23,15 +23,13 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, Infeasible, cure_of, warn
+from nutdamp.errors import Infeasible, warn
 from nutdamp.schemes.catalogue import (
     LEAST,
-    NAMES,
-    SCHEMES,
     OptimalOptions,
     Options,
-    SchemeOptions,
-    names_of,
+    expect_names,
+    expect_options,
 )
 
 if TYPE_CHECKING:
@@ -55,9 +53,7 @@ PathName = str | PathLike[str]
 
 Target = str | Iterable[float | str]
 
-Progress = Callable[
-    [int, int], None
-]  # called now and then with the number of steps done, and that of all
+Progress = Callable[[int, int], None]  # of steps done, and of all
 
 
 def load(
@@ -152,37 +148,6 @@ def _aimed(spacecraft: Spacecraft, target: Target | None, spin: float | str | No
     return aimed(spacecraft, warn, target=target, spin=spin)
 
 
-def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
-    """Names of schemes that there are, each once; raises BadRequest."""
-    several = isinstance(values, Iterable) and not isinstance(values, str)
-    units.expect(several, "names", values, "a list of schemes, such as ['two-pulse']")
-    names = tuple(values)
-    for name in names:
-        if not isinstance(name, str) or name not in NAMES:
-            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure_of(name, NAMES)}")
-    return tuple(dict.fromkeys(names))
-
-
-def _expect_options(
-    value: Choice, chosen: Mapping[str, Any], scheme: str | None = None
-) -> Options | SchemeOptions | None:
-    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
-    BadRequest.
-    """
-    fits = value is None or (isinstance(value, Options | SchemeOptions) and not chosen)
-    units.expect(fits, "options", value, "nutdamp.Options(…) or keywords")
-    if not chosen:
-        return value
-    options = Options(**chosen)
-    if scheme is not None:
-        own = SCHEMES[scheme].options
-        for unread in options.without_effect([own]):
-            raise BadRequest(
-                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
-            )
-    return options
-
-
 def plan(
     spacecraft: Spacecraft,
     scheme: str | None = None,
@@ -219,8 +184,8 @@ def plan(
     from nutdamp.planning import plan as planning
 
     spacecraft = _aimed(spacecraft, target, spin)
-    named = None if scheme is None else _expect_names([scheme])[0]
-    settled = _expect_options(options, chosen, named)
+    named = None if scheme is None else expect_names([scheme])[0]
+    settled = expect_options(options, chosen, named)
     if named is not None:
         return planning.plan(spacecraft, named, settled)
     compared = compare(spacecraft, options=settled)
@@ -252,8 +217,7 @@ def compare(
         As of `plan`; each scheme takes the options that it has.
     samples, timed
         Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values
-        alone; recommend pulses
-        that no command block can fire, too.
+        alone; recommend pulses that no command block can fire, too.
     robust
         Try a robust plan where too few cases comply with each of the usual schemes; not with
         ``samples``.
@@ -267,9 +231,9 @@ def compare(
     from nutdamp.planning import decision
 
     spacecraft = _aimed(spacecraft, target, spin)
-    schemes = _expect_names(names)
+    schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    chosen_options = _expect_options(options, chosen)
+    chosen_options = expect_options(options, chosen)
     compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
     if not robust or count is not None or not compared.too_few_comply:
         return compared
@@ -306,24 +270,21 @@ def robust(
     """
     from nutdamp.planning import robust as search
     from nutdamp.planning.decision import Comparison
-    from nutdamp.spacecraft.model import Spacecraft
     from nutdamp.spacecraft.tolerances import expect_dispersions
 
-    fits = isinstance(spacecraft, Spacecraft | Comparison)
-    units.expect(fits, "spacecraft", spacecraft, "a Spacecraft or a Comparison")
-    compared = spacecraft if isinstance(spacecraft, Comparison) else None
-    body = spacecraft.spacecraft if isinstance(spacecraft, Comparison) else spacecraft
-    expect_dispersions(body.dispersions)
-    if compared is None:
-        compared = compare(body, options=options, robust=False)
+    if isinstance(spacecraft, Comparison):
+        compared = spacecraft
+    else:
+        expect_dispersions(_expected(spacecraft).dispersions)
+        compared = compare(spacecraft, options=options, robust=False)
+    expect_dispersions(compared.spacecraft.dispersions)
     return search.compare(compared, options, progress=progress)
 
 
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
     """Load the pulses of a CSV file as ``plan --csv`` writes it, as a plan of that name.
 
-    Warns where a limit is broken. Raises CannotRead, or
-    FaultyFile.
+    Warns where a limit is broken. Raises CannotRead, or FaultyFile.
 
     Examples
     --------
@@ -427,16 +388,14 @@ def disperse(
     ----------
     samples, seed
         Number of cases, default as many as show the share required, 20,000 or more; and the seed of
-        their draws: a
-        whole number from 0 to 2**64 - 1.
+        their draws: a whole number from 0 to 2**64 - 1.
     threads
         Default: the processors there are.
     csv
         File of the inputs and outputs of each case, written as they are flown.
     remark, progress, stopped
         Called with notes on the model; with the number of cases flown, and that of all; to end
-        early. A stop before
-        the first case raises KeyboardInterrupt.
+        early. A stop before the first case raises KeyboardInterrupt.
 
     Examples
     --------

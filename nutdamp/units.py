@@ -134,7 +134,6 @@ _QUANTITY = re.compile(
 )
 _EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+")
 """A number of YAML 1.2, such as 42e-3, that ``yaml.safe_load``, of YAML 1.1, leaves a text."""
-_PLAIN = re.compile(r"\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*")
 _DECIMAL_COMMA = re.compile(r"[^,.]*[0-9],[0-9][^,.]*")
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
@@ -194,7 +193,8 @@ def word(value: object, kind: str) -> float:
     if not isinstance(value, str):
         return parse(float(value) if is_number(value) else value, kind)  # type: ignore[arg-type]
     number = parse(value, kind, bare=True)
-    return Bare(number) if _PLAIN.fullmatch(value) else number
+    match = _QUANTITY.fullmatch(value)
+    return Bare(number) if match and not match[2] else number
 
 
 def angles(value: object, kind: str = "angle") -> Angles:

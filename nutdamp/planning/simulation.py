@@ -26,9 +26,6 @@ from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
     from nutdamp.flight.verification import Verification
 
 Array = NDArray[np.float64]

@@ -8,12 +8,12 @@ alone.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeVar
 
-from nutdamp.errors import BadRequest, SenselessOption
-from nutdamp.units import as_given, is_count, is_number
+from nutdamp.errors import BadRequest, SenselessOption, cure_of
+from nutdamp.units import as_given, expect, is_count, is_number
 
 LEAST = (
     "propellant",
@@ -350,3 +350,34 @@ POINTING = tuple(
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)
+
+
+def expect_names(values: Iterable[str]) -> tuple[str, ...]:
+    """Names of schemes that there are, each once; raises BadRequest."""
+    several = isinstance(values, Iterable) and not isinstance(values, str)
+    expect(several, "names", values, "a list of schemes, such as ['two-pulse']")
+    names = tuple(values)
+    for name in names:
+        if not isinstance(name, str) or name not in NAMES:
+            raise BadRequest(f"there is no scheme {as_given(name)}; {cure_of(name, NAMES)}")
+    return tuple(dict.fromkeys(names))
+
+
+def expect_options(
+    value: Options | SchemeOptions | None, chosen: Mapping[str, Any], scheme: str | None = None
+) -> Options | SchemeOptions | None:
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
+    BadRequest.
+    """
+    fits = value is None or (isinstance(value, Options | SchemeOptions) and not chosen)
+    expect(fits, "options", value, "nutdamp.Options(…) or keywords")
+    if not chosen:
+        return value
+    options = Options(**chosen)
+    if scheme is not None:
+        own = SCHEMES[scheme].options
+        for unread in options.without_effect([own]):
+            raise BadRequest(
+                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
+            )
+    return options
