@@ -203,14 +203,10 @@ def angles(value: object, kind: str = "angle") -> Angles:
     """
     if isinstance(value, Angles):
         return value
-    parts = list[object]()
-    point = ""
-    if isinstance(value, str):
-        parts = [part.strip() for part in value.split(",")]
-        point = "; decimals take a point" if len(parts) > 2 else ""
-    elif isinstance(value, Iterable):
-        parts = [*value]
+    entries = value.split(",") if isinstance(value, str) else value
+    parts = [*entries] if isinstance(entries, Iterable) else []
     if len(parts) != 2:
+        point = "; decimals take a point" if isinstance(value, str) and len(parts) > 2 else ""
         raise ValueError(f"{shown(value)} is not two angles, such as 10deg,45deg{point}")
     return Angles(word(parts[0], kind), word(parts[1], "angle"))
 

@@ -21,7 +21,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import Table
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
-from nutdamp.files.tabular import csv_text, whole_file
+from nutdamp.files.tabular import csv_text, structured, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propagation import Flight
@@ -302,7 +302,7 @@ def in_degrees(names: Sequence[str], rows: Iterable[Array]) -> list[Array]:
 def samples_array(flown: Dispersion) -> Table:
     """One row a case; raises BadRequest where the cases were counted and not kept."""
     study = flown.core.study
-    return _array(sample_header(study), sample_columns(study, 0, _values(flown.core)))
+    return structured(sample_header(study), sample_columns(study, 0, _values(flown.core)))
 
 
 def samples_file(flown: Dispersion) -> Callable[[IO[bytes]], None]:
@@ -322,19 +322,10 @@ def percentiles_array(flown: Dispersion, levels: Sequence[float]) -> Table:
     """One row a level, %, of each output, NaN where it is not known."""
     names = output_header(flown.core.study)
     shares = np.array(levels) / 100.0
-    rows = []
-    for row in range(len(names)):
-        spread = flown.core.spread_of(row)
-        rows.append(np.full(len(shares), math.nan) if spread is None else spread.quantiles(shares))
-    return _array(["percent", *names], [np.array(levels), *in_degrees(names, rows)])
-
-
-def _array(names: Sequence[str], columns: Sequence[NDArray[Any]]) -> Table:
-    kinds = [(name, column.dtype) for name, column in zip(names, columns, strict=True)]
-    table = np.empty(len(columns[0]), dtype=kinds)
-    for name, column in zip(names, columns, strict=True):
-        table[name] = column
-    return table
+    unknown = np.full(len(shares), math.nan)
+    spreads = map(flown.core.spread_of, range(len(names)))
+    rows = [unknown if spread is None else spread.quantiles(shares) for spread in spreads]
+    return structured(["percent", *names], [np.array(levels), *in_degrees(names, rows)])
 
 
 class SamplesWriter:

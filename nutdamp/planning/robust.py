@@ -79,8 +79,8 @@ class Cost(NamedTuple):
     nutation: float
 
 
-@dataclass(frozen=True, eq=False)
-class RobustComparison(results.Data):
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustComparison(results.Data, results.Shown):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the
     robust plan.
 

@@ -946,21 +946,37 @@ class Tags(HTMLParser):
 
 
 @pytest.mark.deep
-def test_notebooks_show_small_tables() -> None:
+def test_notebooks_show_a_headline_bounds_a_table_and_a_picture() -> None:
     craft = nutdamp.read(TILTED.replace("Tilted", "'<b>&\"'"))
+    scattered = CALM.with_(
+        omega0=[0.1, 0, 3],
+        steerable={"torque": "40 N m"},
+        requirement={"nutation": "0.5 deg"},
+        dispersions={"thrust": {"normal": "1 %"}},
+    )
     compared = nutdamp.compare(craft)
     plan = compared["two-pulse"]
-    for shown in (craft, compared, plan, plan.fly(), nutdamp.plan(craft, "four-pulse")):
+    dispersed = nutdamp.disperse(nutdamp.plan(scattered, "two-pulse"), 2_100)
+    rows: list[tuple[Any, str, int, bool]] = [
+        (craft, "", 1, False),
+        (plan.fly(), "", 1, True),
+        (plan.simulate(9.0), "", 1, True),
+        (plan, "FLY two-pulse: pulses 2", 2, True),
+        (compared, "FLY", 2, True),
+        (nutdamp.plan(craft, "four-pulse"), "NO PLAN: ", 0, False),
+        (nutdamp.loop(nutdamp.example("upper-stage"), 60.0), "ENOUGH: met", 2, True),
+        (dispersed, "FLY two-pulse: pulses 2", 2, True),
+        (nutdamp.robust(scattered), "FLY", 2, True),
+    ]
+    for shown, headline, tables, drawn in rows:
         tags = Tags()
         text = present(shown._repr_html_())
         tags.feed(text)
         assert tags.open == []
-        assert "table" in tags.seen or "infeasible" in text
-        assert ("svg" in tags.seen) == (
-            shown is not craft and "infeasible" not in text
-        )  # the motion beside the table
+        assert headline in text, shown
+        assert (text.count("<table"), "svg" in tags.seen) == (tables, drawn), shown
         assert "b" not in tags.seen
-        assert repr(shown).startswith(f"<{type(shown).__name__}")
+        assert re.fullmatch(r"<\w+ .*>|<\w+: .*>", repr(shown))
 
 
 def test_notebooks_show_less_without_matplotlib_and_jinja(monkeypatch: pytest.MonkeyPatch) -> None:
