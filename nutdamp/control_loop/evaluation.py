@@ -88,14 +88,17 @@ class _Independent(Dynamics):
 
 @dataclass(frozen=True, eq=False)
 class LoopVerification(results.Data):
-    """A loop and the same by DOP853; ``missing`` is why that was not flown to the end."""
+    """The ``run`` of a loop and the ``other`` by DOP853, with its ``evaluations`` of the equations;
+    ``missing`` is why that was not flown to the end.
+
+    ``pairs``: differences of each firing, start and on-time, s, and nutation before it, rad.
+    """
 
     run: LoopRun
     other: LoopRun | None
     missing: str = ""
     evaluations: int = 0
     pairs: tuple[tuple[float, float, float], ...] = field(default=())
-    """Differences of each firing: start and on-time, s, and nutation before it, rad."""
 
     @property
     def same(self) -> bool:

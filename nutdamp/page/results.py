@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from os import PathLike
@@ -77,6 +78,7 @@ VIEWS = {
     "Fitted.data": "views.fit:fit_json",
     "Fitted.figure": "figures.signals:fit_figure",
     "Fit.text": "files.carried:fitted_text",
+    "Plan.former": "page.results:former",
     "Plan.simulated": "api:simulate",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
@@ -270,3 +272,26 @@ def _blocks(result: Spacecraft | Plan | Flight | Comparison | Dispersion) -> Ite
 
 def _summary(flight: Flight) -> str:
     return f"{len(flight.schedule)} pulses until {flight.shown_to:.4g} s by {flight.model}"
+
+
+FORMER = {
+    **{"remarks": "notes", "to_numpy": "numpy.asarray(plan)", "flight": "fly()"},
+    "to_pandas": "pandas.DataFrame(numpy.asarray(plan))",
+    **{"refusal": "why", "left": "flown", "held": "verdict.lines", "shortfalls": "verdict.lines"},
+    **dict.fromkeys(("failure", "breach", "astray", "worse", "worse_at", "from_file", "cut"), ""),
+    **dict.fromkeys(("found_none", "carried_at", "reaching", "disturbed", "commandable"), ""),
+    **dict.fromkeys(("ends_well", "standing", "severity", "spin_change", "delta_v"), ""),
+    **{"aspects": "verdict.aspects", "kept": "verdict.lines"},
+}
+"""Names of `Plan` that were public to version 0.3, and what to write for some."""
+
+
+def former(result: Plan, name: str) -> Any:
+    """Attribute of a plan by its former name, with a warning; AttributeError for any other."""
+    if name not in FORMER:
+        raise AttributeError(f"{type(result).__name__!r} object has no attribute {name!r}")
+    cure = FORMER[name]
+    instead = f": {cure} has it" if cure else ""
+    warning = f"{name} of a plan goes with version 0.5{instead}"
+    warnings.warn(warning, DeprecationWarning, stacklevel=4)  # of who asks the plan
+    return getattr(result, "notes" if cure == "notes" else f"_{name}")

@@ -264,8 +264,8 @@ classic scheme.
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(results.Data, results.Tabled):
-    """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of
-    them.
+    """The ``plans`` for a ``spacecraft``, and the recommended one; ``comparison["two-pulse"]`` is
+    one of them.
 
     ``flown``: the feasible ones in dispersed cases; None where these were not to be flown.
     ``named``: their schemes were; ``timed``: pulses may be timed one by one though the spacecraft

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -42,29 +41,15 @@ class Standing(Enum):
     MISSES = "misses"  # does not meet it, or, without one, does not damp
 
 
-FORMER = {
-    **{"remarks": "notes", "to_numpy": "numpy.asarray(plan)", "flight": "fly()"},
-    "to_pandas": "pandas.DataFrame(numpy.asarray(plan))",
-    **{"refusal": "why", "left": "flown", "held": "verdict.lines", "shortfalls": "verdict.lines"},
-    **dict.fromkeys(("failure", "breach", "astray", "worse", "worse_at", "from_file", "cut"), ""),
-    **dict.fromkeys(("found_none", "carried_at", "reaching", "disturbed", "commandable"), ""),
-    **dict.fromkeys(("ends_well", "standing", "severity", "spin_change", "delta_v"), ""),
-    **{"aspects": "verdict.aspects", "kept": "verdict.lines"},
-}
-"""Names of `Plan` that were public to version 0.3, and what to write for some."""
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(results.Data, results.Rows):
     """``schedule`` of a ``scheme`` for a ``spacecraft``, and its judgement; None where infeasible.
 
-    ``options``: those of the scheme that it was planned with. Without a schedule one of these: the
-    ``_refusal`` of the scheme in its words, the first ``_breach`` of the schedule found, the cone
-    that the spin axis would break (``_astray``) on its way to a target, or the nutation (rad) that
-    would be left where that is ``_worse`` than without pulses, at ``_worse_at`` s.
-    `nutdamp.planning.causes` has the words of all four. ``_failure``: the exception of a scheme
-    that has a bug; ``_from_file``: the pulses were read, no scheme planned them. ``_cut``: its
-    search ended at its budget of `work`.
+    ``options``: those of the scheme that it was planned with. Without a schedule one of these is
+    why, in the words of `nutdamp.planning.causes`: ``_refusal``, ``_breach`` of a limit, a cone
+    that the axis breaks (``_astray``), nutation that gets ``_worse``, rad, at ``_worse_at`` s.
+    ``_failure``: the exception of a bug; ``_from_file``: read, not planned; ``_cut``: its search
+    ended at its budget of `work`.
     """
 
     spacecraft: Spacecraft
@@ -126,13 +111,7 @@ class Plan(results.Data, results.Rows):
         _to_numpy, _to_pandas = results.Tabled.to_numpy, results.Tabled.to_pandas
 
         def __getattr__(self, name: str) -> Any:
-            if name not in FORMER:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            cure = FORMER[name]
-            instead = f": {cure} has it" if cure else ""
-            warning = f"{name} of a plan goes with version 0.5{instead}"
-            warnings.warn(warning, DeprecationWarning, stacklevel=2)
-            return getattr(self, "notes" if cure == "notes" else f"_{name}")
+            return results.view(self, "former", name)  # or AttributeError
 
     def fly(
         self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False

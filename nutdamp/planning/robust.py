@@ -84,7 +84,8 @@ class RobustComparison(results.Data, results.Shown):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the
     robust plan.
 
-    ``ground`` decided among the ``equals`` candidates, by propellant or by impulse. ``tightening``:
+    ``ground`` decided among the ``equals`` ``candidates`` of a ``comparison``, by propellant or by
+    impulse; ``probability``: share of the cases that must comply. ``tightening``:
     tolerances with which enough cases would comply, where too few do. ``fresh``: the robust plan in
     cases by which it was not chosen.
     """

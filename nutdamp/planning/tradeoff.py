@@ -360,8 +360,8 @@ def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trade(results.Data, results.Written):
-    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift
-    allowed.
+    """Time against cost for a ``spacecraft``: ``fronts`` of schedules of the scheme optimal, one
+    for each momentum shift allowed, rad.
 
     ``recommended``: the plan that ``nutdamp plan`` recommends, if any.
     """

@@ -67,7 +67,7 @@ def _option(default: Any, kind: OptionKind, text: str, *, as_is: bool = False) -
 
 @dataclass(frozen=True, kw_only=True)
 class SchemeOptions:
-    """Options of every scheme. Raises SenselessOption for an invalid value."""
+    """Options of every scheme: ``with_disturbances``, ``equal``. Raises SenselessOption."""
 
     equal: ClassVar[bool] = False  # whether the pulses are of one size, which corrections keep
     with_disturbances: bool = _option(
@@ -105,7 +105,7 @@ class SchemeOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoPulseOptions(SchemeOptions):
-    """Options of two-pulse."""
+    """Options of two-pulse; ``literal``: as printed by Magnus."""
 
     literal: bool = _option(
         False, FLAG, "As printed by Magnus: equal halves, small-angle wait.", as_is=True
@@ -118,7 +118,7 @@ DEFAULT_SHARE = 0.125
 
 @dataclass(frozen=True, kw_only=True)
 class FourPulseOptions(SchemeOptions):
-    """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
+    """Of four-pulse: ``on_time`` s, None: min(max_on_time, T_ω/8); ``least``; ``coarse``."""
 
     on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
     least: str = _option(LEAST[0], SAVED, "What to save.")
@@ -155,7 +155,7 @@ class CommandBlockOptions(SchemeOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class RhumbLineOptions(SchemeOptions):
-    """Options of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
+    """Options of rhumb-line: ``on_time`` s (None: an eighth of a spin turn), ``per_turn``."""
 
     equal: ClassVar[bool] = True  # the width is one command
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
@@ -164,7 +164,8 @@ class RhumbLineOptions(SchemeOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalOptions(SchemeOptions):
-    """Options of optimal; ``shift`` rad, how far from its target H may end.
+    """Options of optimal; ``least``: what to save, of `LEAST`; ``shift`` rad, how far from its
+    target H may end.
 
     ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something
     else.

@@ -453,7 +453,9 @@ def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True, eq=False)
 class CheckedFile(Data):
-    """A valid ``spacecraft`` file, with ``doubts`` on numbers that are hardly meant."""
+    """A valid ``spacecraft`` file, with ``doubts`` on numbers that are hardly meant; ``data``: its
+    entry in JSON.
+    """
 
     spacecraft: Spacecraft
     doubts: tuple[Fault, ...]

@@ -4,6 +4,7 @@ studies.
 
 import csv
 import doctest
+import inspect
 import io
 import json
 import math
@@ -39,7 +40,7 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.montecarlo import study
 from nutdamp.montecarlo.inputs import list_inputs
-from nutdamp.page import report
+from nutdamp.page import report, results
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import plan
 
@@ -90,6 +91,43 @@ def test_every_public_name_is_there_and_no_other() -> None:
     assert sorted(nutdamp.__all__) == dir(nutdamp)
     with pytest.raises(AttributeError, match="nonsense"):
         _ = nutdamp.nonsense  # type: ignore[attr-defined]
+
+
+CLASSES = [
+    pytest.param(value, id=name)
+    for name in nutdamp.__all__
+    if isinstance(value := getattr(nutdamp, name), type)
+]
+
+UNIT = re.compile(
+    r"\b(rad|s|kg|m|N|Hz)\b|%|share|ratio|number|factor|unit vector|sign\b", re.IGNORECASE
+)
+"""Units, and words for numbers without one."""
+
+ANGLE = re.compile(r"nutation$|cone$|shift$|axis_error|tilt$|angle$|azimuth|^largest$")
+"""Names of angles: their docstrings say that they are in rad."""
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_every_public_attribute_is_documented_with_its_unit(kind: type) -> None:
+    """Fields in the docstrings of their class and its bases, others in their own."""
+    bases = [base for base in kind.__mro__ if base.__module__.startswith("nutdamp")]
+    about = " ".join(inspect.getdoc(base) or "" for base in bases)
+    fields = {name: text for base in bases for name, text in inspect.get_annotations(base).items()}
+    attributes = {name for name in dir(kind) if not hasattr(Exception(), name)} | {*fields}
+    for name in (name for name in sorted(attributes) if name[0] != "_"):
+        member: Any = inspect.getattr_static(kind, name, None)
+        getter = getattr(member, "fget", None) or getattr(member, "func", None)
+        own = (getter or member).__doc__ if getter or inspect.isroutine(member) else ""
+        if name in fields and getter is None:
+            assert re.search(rf"\b{name}\b", about), name
+            value, text = str(fields[name]), about
+        else:
+            assert own, name
+            value, text = str(getattr(getter, "__annotations__", {}).get("return")), own
+        if re.search(r"\b(float|Vector|Array)\b", value):
+            assert UNIT.search(text), name
+            assert not ANGLE.search(name) or "rad" in text, name
 
 
 @pytest.mark.weekly
@@ -615,13 +653,14 @@ def test_a_plan_has_few_names_and_the_former_ones_warn(monkeypatch: pytest.Monke
     monkeypatch.setitem(sys.modules, "pandas", pandas)
     plan = planned()
     assert [name for name in dir(plan) if name[0] != "_"] == sorted(PUBLIC.split())
-    for name, cure in planning.FORMER.items():
+    for name, cure in results.FORMER.items():
         with pytest.warns(DeprecationWarning, match=f"^{name} of a plan goes .*{re.escape(cure)}"):
             former = getattr(plan, name)
         own = getattr(plan, "notes" if name == "remarks" else f"_{name}")
         assert former is own or repr(former) == repr(own), name
-    with pytest.warns(DeprecationWarning, match="to_numpy"):
+    with pytest.warns(DeprecationWarning, match="to_numpy") as warned:
         assert np.array_equal(plan.to_numpy(), np.asarray(plan))
+    assert warned[0].filename == __file__
     with pytest.warns(DeprecationWarning, match="to_pandas"):
         assert tuple(plan.to_pandas()) == np.asarray(plan).dtype.names
     with pytest.raises(AttributeError, match="'Plan' object has no attribute 'flights'"):
