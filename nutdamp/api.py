@@ -501,8 +501,9 @@ def verify(plan: Plan) -> Verified:
     from nutdamp.planning.simulation import Verified, unrounded
 
     spacecraft, expected = feasible(plan).spacecraft, plan.options.with_disturbances
-    core = verification.verify(spacecraft, plan.pulses, unrounded(plan), expected=expected)
-    return Verified(core, plan)
+    return Verified(
+        verification.verify(spacecraft, plan.pulses, unrounded(plan), expected=expected), plan
+    )
 
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:
@@ -631,8 +632,12 @@ def fit(
         fired, odd = read_pulses(
             units.path("schedule", schedule, "a Plan or the name of a file"), spacecraft
         )
-    times = None if sun_pulses is None else units.path("sun_pulses", sun_pulses)
-    record, remarks = read_telemetry(name, spacecraft, times, fired)
+    record, remarks = read_telemetry(
+        name,
+        spacecraft,
+        None if sun_pulses is None else units.path("sun_pulses", sun_pulses),
+        fired,
+    )
     for remark in (*odd, *remarks):
         (ignored or warn)(remark)
     estimate = compared(spacecraft, record)
@@ -683,8 +688,10 @@ def report(
     compared = compare(read, names, options, samples=samples)
     known = isinstance(options, Options) and options.with_disturbances
     fronts = () if points is None else trade(read, points, with_disturbances=known).fronts
-    given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "points": points}
-    given |= {key: repr(value) for key, value in control.items()}
+    given = {
+        **{"options": options and f"nutdamp.{options!r}", "disperse": disperse, "points": points},
+        **{key: repr(value) for key, value in control.items()},
+    }
     keyed = (f"{key}={value}" for key, value in given.items() if value is not None)
     how = ", ".join([repr(name), *[repr(list(names))] * bool(names), *keyed])
     page = made_of(compared, called(read, how), kept, fronts)

@@ -301,8 +301,9 @@ def in_degrees(names: Sequence[str], rows: Iterable[Array]) -> list[Array]:
 
 def samples_array(flown: Dispersion) -> Table:
     """One row a case; raises BadRequest where the cases were counted and not kept."""
-    study = flown.core.study
-    return structured(sample_header(study), sample_columns(study, 0, _values(flown.core)))
+    return structured(
+        sample_header(flown.core.study), sample_columns(flown.core.study, 0, _values(flown.core))
+    )
 
 
 def samples_file(flown: Dispersion) -> Callable[[IO[bytes]], None]:

@@ -194,9 +194,8 @@ def line(
         )
         return f"<Comparison of {', '.join(plan.scheme for plan in result)}: {verdict}>"
     if isinstance(result, Flight):
-        residual = result.residual
-        shift = degrees(residual.momentum_shift)
-        ended = f"nutation left {degrees(residual.nutation)}, momentum shift {shift}"
+        nutation, shift = map(degrees, (result.residual.nutation, result.residual.momentum_shift))
+        ended = f"nutation left {nutation}, momentum shift {shift}"
         return f"<Flight of {_summary(result)}: {ended}>"
     if result.flown is None:
         return f"<Plan {result.scheme}: infeasible, {result.why}>"
@@ -248,17 +247,17 @@ def _blocks(result: Spacecraft | Plan | Flight | Comparison | Dispersion) -> Ite
         yield facts_of(result.name, derived_table(result))
         return
     if isinstance(result, Flight):
-        names = ("nutation", "body_cone", "space_cone", "momentum_shift")
         rows = tuple(
-            (name.replace("_", " "), degrees(getattr(result.residual, name))) for name in names
+            (name.replace("_", " "), degrees(getattr(result.residual, name)))
+            for name in ("nutation", "body_cone", "space_cone", "momentum_shift")
         )
         yield FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
         return
     judged = result.verdict
     about = "".join(verdict.headline(judged, result if isinstance(result, Comparison) else None))
     stated = "" if judged.why else f". {sentence(verdict.statement(judged))}"
-    loop = hasattr(result, "flown_run")
-    yield Prose(verdict.loop_sentence(judged) if loop else about + stated)
+    of_loop = verdict.loop_sentence(judged) if hasattr(result, "flown_run") else ""
+    yield Prose(of_loop or about + stated)
     if judged.lines:
         yield sheet(verdict.bound_table(judged))
     if isinstance(result, Plan | Comparison):
@@ -290,8 +289,7 @@ def former(result: Plan, name: str) -> Any:
     """Attribute of a plan by its former name, with a warning; AttributeError for any other."""
     if name not in FORMER:
         raise AttributeError(f"{type(result).__name__!r} object has no attribute {name!r}")
-    cure = FORMER[name]
-    instead = f": {cure} has it" if cure else ""
+    instead = f": {FORMER[name]} has it" if FORMER[name] else ""
     warning = f"{name} of a plan goes with version 0.5{instead}"
     warnings.warn(warning, DeprecationWarning, stacklevel=4)  # of who asks the plan
-    return getattr(result, "notes" if cure == "notes" else f"_{name}")
+    return getattr(result, "notes" if name == "remarks" else f"_{name}")
