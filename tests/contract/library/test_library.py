@@ -150,11 +150,13 @@ def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
 @pytest.mark.deep
 def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
     run("init")
-    example, sweep = (
+    example, dispersion, sweep = (
         python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py"))
-        for name in ("example", "sweep")
+        for name in ("example", "dispersion", "sweep")
     )
-    assert example.returncode == sweep.returncode == 0, example.stderr + sweep.stderr
+    for ran in (example, dispersion, sweep):
+        assert ran.returncode == 0, ran.stderr
+    assert re.match(r"\[0\.\d+ 0\.\d+\]\n0\.0\d+\n", dispersion.stdout)
     assert "<Plan two-pulse: 2 pulses until 7.434 s" in example.stdout
     assert (tmp_path / "track.csv").stat().st_size > 100_000
     lines = []
