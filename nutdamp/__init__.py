@@ -8,49 +8,59 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nutdamp import errors as errors
-    from nutdamp.api import budget as budget
-    from nutdamp.api import check as check
-    from nutdamp.api import compare as compare
-    from nutdamp.api import disperse as disperse
-    from nutdamp.api import disperse_loop as disperse_loop
-    from nutdamp.api import example as example
-    from nutdamp.api import export as export
-    from nutdamp.api import fit as fit
-    from nutdamp.api import load as load
-    from nutdamp.api import load_schedule as load_schedule
-    from nutdamp.api import loop as loop
-    from nutdamp.api import plan as plan
-    from nutdamp.api import read as read
-    from nutdamp.api import report as report
-    from nutdamp.api import robust as robust
-    from nutdamp.api import simulate as simulate
-    from nutdamp.api import trade as trade
-    from nutdamp.api import verify as verify
-    from nutdamp.api import verify_loop as verify_loop
+    from nutdamp.api import (
+        budget as budget,
+        check as check,
+        compare as compare,
+        disperse as disperse,
+        disperse_loop as disperse_loop,
+        example as example,
+        export as export,
+        fit as fit,
+        load as load,
+        load_schedule as load_schedule,
+        loop as loop,
+        plan as plan,
+        read as read,
+        report as report,
+        robust as robust,
+        simulate as simulate,
+        trade as trade,
+        verify as verify,
+        verify_loop as verify_loop,
+    )
     from nutdamp.control_loop.budget import Budget as Budget
     from nutdamp.control_loop.dispersion import LoopDispersion as LoopDispersion
-    from nutdamp.control_loop.evaluation import LoopPlan as LoopPlan
-    from nutdamp.control_loop.evaluation import LoopVerification as LoopVerification
+    from nutdamp.control_loop.evaluation import (
+        LoopPlan as LoopPlan,
+        LoopVerification as LoopVerification,
+    )
     from nutdamp.errors import NutdampError as NutdampError
     from nutdamp.estimation.results import Fitted as Fitted
-    from nutdamp.flight.propagation import Flight as Flight
-    from nutdamp.flight.propagation import Residual as Residual
-    from nutdamp.flight.propagation import Track as Track
+    from nutdamp.flight.propagation import (
+        Flight as Flight,
+        Residual as Residual,
+        Track as Track,
+    )
     from nutdamp.page.report import Report as Report
     from nutdamp.planning.decision import Comparison as Comparison
     from nutdamp.planning.plan import Plan as Plan
     from nutdamp.planning.robust import RobustComparison as RobustComparison
     from nutdamp.planning.screening import Dispersion as Dispersion
-    from nutdamp.planning.simulation import Simulation as Simulation
-    from nutdamp.planning.simulation import Verified as Verified
+    from nutdamp.planning.simulation import (
+        Simulation as Simulation,
+        Verified as Verified,
+    )
     from nutdamp.planning.tradeoff import Trade as Trade
     from nutdamp.planning.verdict import Verdict as Verdict
-    from nutdamp.schemes.catalogue import FourPulseOptions as FourPulseOptions
-    from nutdamp.schemes.catalogue import HalfConeOptions as HalfConeOptions
-    from nutdamp.schemes.catalogue import OptimalOptions as OptimalOptions
-    from nutdamp.schemes.catalogue import Options as Options
-    from nutdamp.schemes.catalogue import RhumbLineOptions as RhumbLineOptions
-    from nutdamp.schemes.catalogue import TwoPulseOptions as TwoPulseOptions
+    from nutdamp.schemes.catalogue import (
+        FourPulseOptions as FourPulseOptions,
+        HalfConeOptions as HalfConeOptions,
+        OptimalOptions as OptimalOptions,
+        Options as Options,
+        RhumbLineOptions as RhumbLineOptions,
+        TwoPulseOptions as TwoPulseOptions,
+    )
     from nutdamp.spacecraft.model import Spacecraft as Spacecraft
     from nutdamp.views.check import CheckedFile as CheckedFile
 

@@ -23,15 +23,13 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, Infeasible, cure_of, warn
+from nutdamp.errors import Infeasible, warn
 from nutdamp.schemes.catalogue import (
     LEAST,
-    NAMES,
-    SCHEMES,
     OptimalOptions,
     Options,
-    SchemeOptions,
-    names_of,
+    expect_names,
+    expect_options,
 )
 
 if TYPE_CHECKING:
@@ -53,9 +51,9 @@ if TYPE_CHECKING:
 
 PathName = str | PathLike[str]
 
-Progress = Callable[
-    [int, int], None
-]  # called now and then with the number of steps done, and that of all
+Target = str | Iterable[float | str]
+
+Progress = Callable[[int, int], None]  # of steps done, and of all
 
 
 def load(
@@ -141,39 +139,24 @@ def _expected(spacecraft: Spacecraft) -> Spacecraft:
     )
 
 
-def _expect_names(values: Iterable[str]) -> tuple[str, ...]:
-    """Names of schemes that there are, each once; raises BadRequest."""
-    several = isinstance(values, Iterable) and not isinstance(values, str)
-    units.expect(several, "names", values, "a list of schemes, such as ['two-pulse']")
-    names = tuple(values)
-    for name in names:
-        if not isinstance(name, str) or name not in NAMES:
-            raise BadRequest(f"there is no scheme {units.as_given(name)}; {cure_of(name, NAMES)}")
-    return tuple(dict.fromkeys(names))
+def _aimed(spacecraft: Spacecraft, target: Target | None, spin: float | str | None) -> Spacecraft:
+    """Spacecraft with a goal beside its file; raises BadRequest, and warns as the command line."""
+    _expected(spacecraft)
+    if target is None and spin is None:
+        return spacecraft
+    from nutdamp.files.editing import aimed
 
-
-def _expect_options(
-    value: Choice, chosen: Mapping[str, Any], scheme: str | None = None
-) -> Options | SchemeOptions | None:
-    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
-    BadRequest.
-    """
-    fits = value is None or (isinstance(value, Options | SchemeOptions) and not chosen)
-    units.expect(fits, "options", value, "nutdamp.Options(…) or keywords")
-    if not chosen:
-        return value
-    options = Options(**chosen)
-    if scheme is not None:
-        own = SCHEMES[scheme].options
-        for unread in options.without_effect([own]):
-            raise BadRequest(
-                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
-            )
-    return options
+    return aimed(spacecraft, warn, target=target, spin=spin)
 
 
 def plan(
-    spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any
+    spacecraft: Spacecraft,
+    scheme: str | None = None,
+    options: Choice = None,
+    *,
+    target: Target | None = None,
+    spin: float | str | None = None,
+    **chosen: Any,
 ) -> Plan:
     """Plan one scheme, or the recommended one, and fly it to judge it.
 
@@ -189,6 +172,9 @@ def plan(
     options, chosen
         `Options` of several schemes, or the options of one scheme. Or their fields by keyword, in
         SI: ``on_time=0.2`` (s).
+    target, spin
+        Goal in place of that of the file, as ``--target`` and ``--spin`` take it: ``"10deg,45deg"``
+        or two numbers in rad; ``"30rpm"``, ``"keep"`` or a number in rad/s.
 
     Examples
     --------
@@ -199,9 +185,9 @@ def plan(
     """
     from nutdamp.planning import plan as planning
 
-    spacecraft = _expected(spacecraft)
-    named = None if scheme is None else _expect_names([scheme])[0]
-    settled = _expect_options(options, chosen, named)
+    spacecraft = _aimed(spacecraft, target, spin)
+    named = None if scheme is None else expect_names([scheme])[0]
+    settled = expect_options(options, chosen, named)
     if named is not None:
         return planning.plan(spacecraft, named, settled)
     compared = compare(spacecraft, options=settled)
@@ -218,6 +204,8 @@ def compare(
     samples: int | None = None,
     timed: bool = False,
     robust: bool = True,
+    target: Target | None = None,
+    spin: float | str | None = None,
     **chosen: Any,
 ) -> Comparison:
     """Plan schemes, compare them and recommend one, as ``nutdamp plan`` does.
@@ -226,7 +214,7 @@ def compare(
     ----------
     names
         Schemes. Default: the classic three and optimal; with a target axis the schemes that point.
-    options, chosen
+    options, target, spin, chosen
         As for `plan`. Each scheme takes the options that it has.
     samples
         Number of dispersed cases of each plan, if the file has dispersions. 0 judges nominal values
@@ -244,10 +232,10 @@ def compare(
     """
     from nutdamp.planning import decision
 
-    spacecraft = _expected(spacecraft)
-    schemes = _expect_names(names)
+    spacecraft = _aimed(spacecraft, target, spin)
+    schemes = expect_names(names)
     count = samples if samples in (None, 0) else units.count("samples", samples)
-    chosen_options = _expect_options(options, chosen)
+    chosen_options = expect_options(options, chosen)
     compared = decision.compare(spacecraft, schemes, chosen_options, samples=count, timed=timed)
     if not robust or count is not None or not compared.too_few_comply:
         return compared
@@ -259,7 +247,7 @@ def compare(
 
 
 def robust(
-    compared: Comparison,
+    spacecraft: Spacecraft | Comparison,
     options: Options | None = None,
     *,
     progress: Progress = lambda _done, _all: None,
@@ -271,8 +259,8 @@ def robust(
 
     Parameters
     ----------
-    compared
-        A comparison from `compare`. Its plans are among the candidates.
+    spacecraft
+        Of `load`, or a comparison of `compare`, whose plans are among the candidates.
     options
         The options that the comparison was made with.
     progress
@@ -287,9 +275,12 @@ def robust(
     from nutdamp.planning.decision import Comparison
     from nutdamp.spacecraft.tolerances import expect_dispersions
 
-    expect_dispersions(
-        units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions
-    )
+    if isinstance(spacecraft, Comparison):
+        compared = spacecraft
+    else:
+        expect_dispersions(_expected(spacecraft).dispersions)
+        compared = compare(spacecraft, options=options, robust=False)
+    expect_dispersions(compared.spacecraft.dispersions)
     return search.compare(compared, options, progress=progress)
 
 
@@ -522,8 +513,9 @@ def verify(plan: Plan) -> Verified:
     from nutdamp.planning.simulation import Verified, unrounded
 
     spacecraft, expected = feasible(plan).spacecraft, plan.options.with_disturbances
-    core = verification.verify(spacecraft, plan.pulses, unrounded(plan), expected=expected)
-    return Verified(core, plan)
+    return Verified(
+        verification.verify(spacecraft, plan.pulses, unrounded(plan), expected=expected), plan
+    )
 
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:
@@ -661,8 +653,12 @@ def fit(
         fired, odd = read_pulses(
             units.path("schedule", schedule, "a Plan or the name of a file"), spacecraft
         )
-    times = None if sun_pulses is None else units.path("sun_pulses", sun_pulses)
-    record, remarks = read_telemetry(name, spacecraft, times, fired)
+    record, remarks = read_telemetry(
+        name,
+        spacecraft,
+        None if sun_pulses is None else units.path("sun_pulses", sun_pulses),
+        fired,
+    )
     for remark in (*odd, *remarks):
         (ignored or warn)(remark)
     estimate = compared(spacecraft, record)
@@ -718,8 +714,10 @@ def report(
     compared = compare(read, names, options, samples=samples)
     known = isinstance(options, Options) and options.with_disturbances
     fronts = () if points is None else trade(read, points, with_disturbances=known).fronts
-    given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "points": points}
-    given |= {key: repr(value) for key, value in control.items()}
+    given = {
+        **{"options": options and f"nutdamp.{options!r}", "disperse": disperse, "points": points},
+        **{key: repr(value) for key, value in control.items()},
+    }
     keyed = (f"{key}={value}" for key, value in given.items() if value is not None)
     how = ", ".join([repr(name), *[repr(list(names))] * bool(names), *keyed])
     page = made_of(compared, called(read, how), kept, fronts)

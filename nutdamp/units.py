@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from os import PathLike, fspath
 from types import UnionType
-from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from nutdamp.errors import BadRequest
 
@@ -132,6 +132,8 @@ LARGEST_SEED = 2**64 - 1
 _QUANTITY = re.compile(
     r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL
 )
+_EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+")
+"""A number of YAML 1.2, such as 42e-3, that ``yaml.safe_load``, of YAML 1.1, leaves a text."""
 _DECIMAL_COMMA = re.compile(r"[^,.]*[0-9],[0-9][^,.]*")
 # sign, whole hours or degrees, the mark behind them, minutes and seconds, in range or not
 _SEXAGESIMAL = re.compile(
@@ -162,6 +164,55 @@ _UNITS = [
     for unit, factor in kind.factors.items()
 ]
 """Spellings of each unit, its kind and its factor to SI."""
+
+
+class Bare(float):
+    """A number that was written without a unit."""
+
+
+class Angles(NamedTuple):
+    """Two angles in rad that name a direction."""
+
+    first: float
+    second: float
+
+    @property
+    def readings(self) -> tuple[str, ...]:
+        """Readings of unitless numbers that are likely degrees: whole, and more than a turn."""
+        doubtful = [
+            angle
+            for angle in self
+            if isinstance(angle, Bare)
+            if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
+        ]
+        return tuple(reading(angle, "angle", "deg") for angle in doubtful)
+
+
+def word(value: object, kind: str) -> float:
+    """SI value of a number, or of a word of a command line, `Bare` without a unit; raises
+    ValueError.
+    """
+    if isinstance(value, Bare):
+        return value
+    if not isinstance(value, str):
+        return parse(float(value) if is_number(value) else value, kind)  # type: ignore[arg-type]
+    number = parse(value, kind, bare=True)
+    match = _QUANTITY.fullmatch(value)
+    return Bare(number) if match and not match[2] else number
+
+
+def angles(value: object, kind: str = "angle") -> Angles:
+    """Two angles in a sequence, or in a text with a comma between them, the first of a ``kind``;
+    raises ValueError.
+    """
+    if isinstance(value, Angles):
+        return value
+    entries = value.split(",") if isinstance(value, str) else value
+    parts = [*entries] if isinstance(entries, Iterable) else []
+    if len(parts) != 2:
+        point = "; decimals take a point" if isinstance(value, str) and len(parts) > 2 else ""
+        raise ValueError(f"{shown(value)} is not two angles, such as 10deg,45deg{point}")
+    return Angles(word(parts[0], kind), word(parts[1], "angle"))
 
 
 def parse(value: object, kind: str, *, bare: bool = False) -> float:
@@ -224,7 +275,7 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     number = float(match[1])
     unit = re.sub(r"\s+", " ", match[2])
-    if not unit and bare:
+    if not unit and (bare or _EXPONENT.fullmatch(text)):
         return number, 1.0
     if not expected.factors:
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")

@@ -330,8 +330,8 @@ class Job:
             return {}
         from nutdamp.files.carried import carried_notes, carried_text
 
-        time = next(value for value in (at, usual, plan.carried_at) if value is not None)
-        text = carried_text(plan.reaching(time), time, self.source)
+        time = next(value for value in (at, usual, plan._carried_at) if value is not None)
+        text = carried_text(plan._reaching(time), time, self.source)
         self.note(carried_notes(self.spacecraft, time, self.source))
         return {"output": lambda: text}
 

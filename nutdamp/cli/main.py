@@ -233,8 +233,8 @@ def show_failures(compared: Comparison) -> bool:
         if click.get_current_context().meta.get(DEBUG):
             import traceback
 
-            say("".join(traceback.format_exception(plan.failure)).rstrip("\n"))
-        say(f"nutdamp: {plan.scheme}: {plan.refusal} (--debug shows the traceback)")
+            say("".join(traceback.format_exception(plan._failure)).rstrip("\n"))
+        say(f"nutdamp: {plan.scheme}: {plan._refusal} (--debug shows the traceback)")
     return bool(compared.failed)
 
 

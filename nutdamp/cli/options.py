@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -18,9 +17,10 @@ from nutdamp import units
 from nutdamp.cli.main import debug_option
 from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, SchemeOptions, names_of
+from nutdamp.units import Angles
 
 if TYPE_CHECKING:
-    from nutdamp.spacecraft.model import Spacecraft, Vector
+    from nutdamp.spacecraft.model import Spacecraft
 
 
 class NameType(click.Choice):  # type: ignore[type-arg]
@@ -35,19 +35,6 @@ class NameType(click.Choice):  # type: ignore[type-arg]
             if close is None:
                 raise
             self.fail(f"{wrong.message.rstrip('.')}; did you mean {close!r}?", param, ctx)
-
-
-class Bare(float):
-    """A number that was written without a unit."""
-
-
-def is_number(word: str) -> bool:
-    """True where a word of the command line is a number without a unit."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 class FileName(click.Path):
@@ -89,13 +76,13 @@ class UnitType(click.ParamType):  # type: ignore[type-arg]
         if value in self.words:
             return self.words[value]  # type: ignore[return-value]
         try:
-            number = units.parse(value, self.kind, bare=True)
+            number = units.word(value, self.kind)
             self.check(number)
         except ValueError as wrong:
             self.fail(str(wrong), param, ctx)
         except BadRequest:
             self.fail(self.problem, param, ctx)
-        return Bare(number) if isinstance(value, str) and is_number(value) else number
+        return number
 
 
 END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
@@ -104,24 +91,6 @@ OF_RECORD = UnitType(
     lambda time: units.expect(time >= 0.0, "at", time, ""),
     "expected the time after the first record, 0 or more, such as 0s or 12.5s",
 )
-
-
-class Angles(NamedTuple):
-    """Two angles in rad that name a direction."""
-
-    first: float
-    second: float
-
-    @property
-    def readings(self) -> tuple[str, ...]:
-        """Readings of unitless numbers that are likely degrees: whole, and more than a turn."""
-        doubtful = [
-            angle
-            for angle in self
-            if isinstance(angle, Bare)
-            if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)
-        ]
-        return tuple(units.reading(angle, "angle", "deg") for angle in doubtful)
 
 
 class Direction(click.ParamType):  # type: ignore[type-arg]
@@ -135,27 +104,20 @@ class Direction(click.ParamType):  # type: ignore[type-arg]
         problem: str = "",
         kind: str = "angle",
     ) -> None:
-        self.check, self.problem, self.kinds = check, problem, (kind, "angle")
+        self.check, self.problem, self.kind = check, problem, kind
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Angles:
         """Both in rad; a usage error for anything else."""
-        if isinstance(value, Angles):
-            return value
-        parts = [part.strip() for part in str(value).split(",")]
-        if len(parts) != 2:
-            point = "; decimals take a point" if len(parts) > 2 else ""
-            self.fail(f"{value!r} is not two angles, such as 10deg,45deg{point}", param, ctx)
-        first, second = (
-            UnitType(kind).convert(part, param, ctx)
-            for kind, part in zip(self.kinds, parts, strict=True)
-        )
         try:
-            self.check([Angles(first, second)])
+            direction = units.angles(value, self.kind)
+            self.check([direction])
+        except ValueError as wrong:
+            self.fail(str(wrong), param, ctx)
         except BadRequest:
             self.fail(self.problem, param, ctx)
-        return Angles(first, second)
+        return direction
 
 
 class Count(click.ParamType):  # type: ignore[type-arg]
@@ -251,10 +213,7 @@ def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
             **{name: value for name, value in taken.items() if value is not False}
         )  # flags not given
     except SenselessOption as wrong:
-        hint = f"--{wrong.name.replace('_', '-')}"
-        raise click.BadParameter(
-            wrong.problem, click.get_current_context(), param_hint=hint
-        ) from None
+        raise as_usage(wrong, click.get_current_context()) from None
 
 
 def _fields() -> dict[str, tuple[dataclasses.Field[Any], list[str]]]:
@@ -294,59 +253,18 @@ class Aim(NamedTuple):
 
     def applied(self, spacecraft: Spacecraft, doubt: Callable[[str], None]) -> Spacecraft:
         """The spacecraft with this goal; a usage error where it has none, a doubt if unlikely."""
-        goal = spacecraft.goal
-        if self.target is not None:
-            axis = _direction(spacecraft, self.target, "--target")
-            goal = dataclasses.replace(goal, axis=axis, sun_angle=None)
-        if self.sun_angle is not None:
-            axis = _at_sun_angle(spacecraft, self)
-            goal = dataclasses.replace(goal, axis=axis, sun_angle=float(self.sun_angle))
-        if self.sun is not None:
-            goal = dataclasses.replace(goal, sun=_direction(spacecraft, self.sun, "--sun"))
-        if self.spin is not None:
-            spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
-            if spin * spacecraft.spin <= 0.0:
-                problem = f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)"
-                raise click.BadParameter(problem, param_hint="--spin")
-            goal = dataclasses.replace(goal, spin=spin)
-        if isinstance(self.spin, Bare) and (
-            self.spin.is_integer() or abs(self.spin) > units.FASTEST
-        ):
-            doubt(f"--spin: {units.reading(self.spin, 'rate', 'rpm')}")
-        for option, angles in (("--target", self.target), ("--sun", self.sun)):
-            for reading in () if angles is None else angles.readings:
-                doubt(f"{option}: {reading}")
-        return dataclasses.replace(spacecraft, goal=goal)
+        from nutdamp.files.editing import aimed
+
+        try:
+            return aimed(spacecraft, lambda text: doubt(f"--{text}"), **self._asdict())
+        except SenselessOption as wrong:
+            raise as_usage(wrong) from None
 
 
-def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
-    """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
-    from nutdamp.physics.attitude import on_sphere
-
-    in_sky = spacecraft.attitude is not None
-    if abs(angles.second) <= 0.5 * math.pi if in_sky else 0.0 <= angles.first < math.pi:
-        return on_sphere(*angles) if in_sky else spacecraft.direction_in_n(*angles)
-    problem = "expected a " + (
-        "declination of -90 deg to 90 deg" if in_sky else "tilt of at least 0 and below 180 deg"
-    )
-    raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
-
-
-def _at_sun_angle(spacecraft: Spacecraft, aim: Aim) -> Vector:
-    """The unit vector (3,) at an angle from the Sun; a usage error without, or with a target."""
-    angle = aim.sun_angle
-    assert angle is not None
-    problem = ""
-    if aim.target is not None:
-        problem = "given together with --target; keep one of the two"
-    elif not 0.0 <= angle <= math.pi:
-        readings = Angles(angle, 0.0).readings
-        problem = "; ".join(("expected an angle of 0 to 180 deg", *readings))
-    elif spacecraft.sun is None:
-        problem = "needs the key sun of the file: [right ascension, declination], or sun: epoch"
-    if problem:
-        raise click.BadParameter(problem, param_hint="--sun-angle")
-    return spacecraft.at_sun_angle(angle)
+def as_usage(wrong: SenselessOption, context: click.Context | None = None) -> click.BadParameter:
+    """The usage error of an option that makes no sense."""
+    hint = f"--{wrong.name.replace('_', '-')}"
+    return click.BadParameter(wrong.problem, context, param_hint=hint)
 
 
 def expect_read(

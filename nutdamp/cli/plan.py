@@ -150,7 +150,7 @@ def plan_command(
     more: Files = {"json": (compared if dispersed is None else dispersed).to_dict, **files}
     more["table"] = lambda: scheme_table(shown, chosen).csv()
     if chosen is not None:
-        more["csv"] = lambda: pulse_table(chosen.flight).csv()
+        more["csv"] = lambda: pulse_table(chosen._flight).csv()
         more["plot"] = partial(shown.figure, job.figure or FIGURES[0])
     more |= job.carried(chosen, at)
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
@@ -175,7 +175,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
         job.doubt(f"writing the blocks of {source.scheme}, which is not the recommended plan")
     from nutdamp.views.parts import block_table
 
-    return {"blocks": lambda: block_table(source.flight).csv()}
+    return {"blocks": lambda: block_table(source._flight).csv()}
 
 
 def _certified(

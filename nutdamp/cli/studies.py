@@ -35,8 +35,6 @@ from nutdamp.cli.options import (
     FILE,
     FOLDER,
     OUTPUT,
-    Angles,
-    Bare,
     Command,
     Count,
     Direction,
@@ -49,7 +47,7 @@ from nutdamp.cli.plan import compared_with, scheme_option
 from nutdamp.common.work import SAMPLES
 from nutdamp.errors import CannotWrite, Infeasible, printable
 from nutdamp.schemes.catalogue import LEAST, NAMES, OPTIMAL, SchemeOptions
-from nutdamp.units import LARGEST_SEED, reading, shifts, thresholds, tilt
+from nutdamp.units import LARGEST_SEED, Angles, Bare, reading, shifts, thresholds, tilt
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -172,7 +170,7 @@ def animate_command(
             "which may seem to run backwards: "
             f"--seconds {timed.turns * image.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
-    flight = plan.reaching(end)
+    flight = plan._reaching(end)
     with job.working("filming"):
         deliver([(output, lambda: lambda stream: image.film(stream, flight, timed, output, width))])
     if output != "-":
@@ -292,7 +290,7 @@ def trade_command(
     expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.doubt)
     traded = fronts_of(job, points, allowed, least)
     for index, _, point in numbered(traded.fronts):
-        if point.plan.cut:
+        if point.plan._cut:
             job.doubt(f"point {index}: {CUT}")
     files: list[Output] = []
     unsaved: list[CannotWrite] = []

@@ -126,8 +126,17 @@ class Written(Drawn):
         view(self, "save", path)
 
 
-class Tabled(Shown, Written):
-    """Mixin of results with rows."""
+class Rows(Shown, Written):
+    """Mixin of results with rows, which ``numpy.asarray(result)`` gives with the columns of
+    `to_csv` as fields.
+    """
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(view(self, "table"), dtype, copy=copy is not False)
+
+
+class Tabled(Rows):
+    """Mixin of results with rows, as arrays and data frames."""
 
     def to_numpy(self) -> Table:
         """Rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
@@ -140,5 +149,5 @@ class Tabled(Shown, Written):
             import pandas
         except ImportError:
             raise MissingPandas from None
-        rows = self.to_numpy()
+        rows = view(self, "table")
         return pandas.DataFrame({name: rows[name] for name in rows.dtype.names or ()})

@@ -651,11 +651,11 @@ class HeldNutation:
 @dataclass(frozen=True, eq=False, repr=False)
 class Budget(results.Data, results.Written):
     """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of
-    thresholds in ``held``.
+    thresholds in ``held``; ``largest``: θ_max, rad, None where none is named.
     """
 
     spacecraft: Spacecraft
-    largest: float | None  # θ_max, rad; None where none is named
+    largest: float | None
     held: tuple[HeldNutation, ...]
 
     def __repr__(self) -> str:

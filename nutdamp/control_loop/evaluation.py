@@ -88,14 +88,17 @@ class _Independent(Dynamics):
 
 @dataclass(frozen=True, eq=False)
 class LoopVerification(results.Data):
-    """A loop and the same by DOP853; ``missing`` is why that was not flown to the end."""
+    """The ``run`` of a loop and the ``other`` by DOP853, with its ``evaluations`` of the equations;
+    ``missing`` is why that was not flown to the end.
+
+    ``pairs``: differences of each firing, start and on-time, s, and nutation before it, rad.
+    """
 
     run: LoopRun
     other: LoopRun | None
     missing: str = ""
     evaluations: int = 0
     pairs: tuple[tuple[float, float, float], ...] = field(default=())
-    """Differences of each firing: start and on-time, s, and nutation before it, rad."""
 
     @property
     def same(self) -> bool:
@@ -172,16 +175,16 @@ class LoopPlan(Plan):
     known: Spacecraft = field(kw_only=True)
 
     @cached_property
-    def flight(self) -> Flight:
+    def _flight(self) -> Flight:
         """Motion to the end of the run."""
         return replace(seen_at(self.flown_run.flight, self.flown_run.until), scheme=LOOP)
 
     @property
-    def carried_at(self) -> float:
+    def _carried_at(self) -> float:
         """End of the run, s."""
         return self.flown_run.until
 
-    def reaching(self, time: float) -> Flight:
+    def _reaching(self, time: float) -> Flight:
         """Flight of the run; raises BadRequest where it ends before ``time`` s."""
         if time > self.flown_run.until:
             raise BadRequest(
@@ -197,19 +200,19 @@ class LoopPlan(Plan):
         return largest_since(self.flown_run)
 
     @property
-    def left(self) -> Left:
+    def _left(self) -> Left:
         """Largest nutation since the loop first settled; direction of H and spin at the end, angles
         to cones.
         """
-        return left_on_the_way(self.flight, self.aspects)._replace(nutation=self.largest[0])
+        return left_on_the_way(self._flight, self._aspects)._replace(nutation=self.largest[0])
 
     @property
-    def held(self) -> tuple[Held, ...]:
+    def _held(self) -> tuple[Held, ...]:
         """Residual beside each bound; without a requirement the nutation is judged by the
         thresholds of the loop.
         """
         limit = max(self.band.most, HELD * self.flown_run.loop.start + self.band.noise)
-        lines = super().held
+        lines = super()._held
         return tuple(
             line
             if line.bound.required or line.bound.part is not Part.NUTATION
@@ -231,17 +234,17 @@ class LoopPlan(Plan):
         run = self.flown_run
         return judge_loop(
             self.spacecraft,
-            self.held,
-            flight=self.flight,
-            observed=self.aspects,
+            self._held,
+            flight=self._flight,
+            observed=self._aspects,
             feasible=not run.stop.fault,
             lost=run.lost,
         )
 
     @cached_property
-    def aspects(self) -> tuple[Aspect, ...]:
+    def _aspects(self) -> tuple[Aspect, ...]:
         """Extreme angles of the spin axis from each watched direction, to the end of the run."""
-        return aspects(self.flight, self.flown_run.until)
+        return aspects(self._flight, self.flown_run.until)
 
     @cached_property
     def margins(self) -> tuple[Margin, ...]:
@@ -276,4 +279,4 @@ def loop_of(
         until = study.until
     truth = flown.truth
     run = fly(truth, truth.loop or loop, until, seed=flown.key, law=law, scatter=flown.scatter)
-    return LoopPlan(truth, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)
+    return LoopPlan(truth, LOOP, run.schedule, _from_file=True, flown_run=run, known=spacecraft)

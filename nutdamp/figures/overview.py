@@ -342,7 +342,7 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
 def shown(plan: Plan) -> tuple[Flight, Track]:
     """A plan flown through its real widths as far as its pictures reach."""
     end = geometry.shown_until(plan.spacecraft, plan.pulses)
-    flown = plan.reaching(end)
+    flown = plan._reaching(end)
     return flown, flown.sampled(ROWS, end)
 
 

@@ -127,7 +127,7 @@ def carried_text(flight: Flight, time: float, source: object) -> str:
 def carried_spacecraft(plan: Plan, time: float) -> Spacecraft:
     """Spacecraft of `carried_text` for the flight of a plan; raises as that does."""
     source = _expected(plan.spacecraft.source, "carried")
-    text = carried_text(plan.reaching(time), time, source)
+    text = carried_text(plan._reaching(time), time, source)
     return Source(text, source.name, aimed=source.aimed).read()
 
 

@@ -4,12 +4,14 @@ values in its text.
 A key set beside the file changes its tree before anything in it is checked, so that settings are
 checked exactly as the file is. In the text, comments, the order of the keys and units stay as they
 were; it must have been read by `yaml.read_tree`, and so is neither a bomb nor of other than core
-values. `motion_edits` are the values of a later moment, by which a file is carried on.
+values. A goal beside the file is for one command or call. `motion_edits` are the values of a later
+moment, by which a file is carried on.
 """
 
 from __future__ import annotations
 
 import ast
+import datetime
 import json
 import math
 import re
@@ -17,24 +19,26 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import yaml
 
 from nutdamp.common.time import Epoch
-from nutdamp.errors import BadRequest, Fault, FaultyFile, cure_of
+from nutdamp.errors import BadRequest, Fault, FaultyFile, SenselessOption, cure_of
 from nutdamp.files.fields import KeyPath
 from nutdamp.files.yaml import MAX_DEPTH, Node, Place, dotted, read_tree, read_value
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.units import KINDS, parse, shown
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.units import FASTEST, KINDS, Angles, Bare, angles, parse, reading, shown, word
 
 _QUOTED = r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\""""
 _STEP = re.compile(
     rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,6}}|[^.\[\]='\"]+|{_QUOTED})\]"
 )
+
+Argument = TypeVar("Argument")
 
 
 class Setting(NamedTuple):
@@ -98,7 +102,7 @@ def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Itera
     BadRequest.
     """
     if len(behind) >= MAX_DEPTH:
-        raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
+        raise BadRequest(f"with_ {dotted(behind[:1])}: nested more than {MAX_DEPTH} levels deep")
     for key, value in values.items():
         if not isinstance(key, str):
             raise BadRequest(
@@ -207,24 +211,111 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
 
 
-def _of_python(value: object, place: Place, depth: int = 0) -> Node:
-    """A Python value as part of a tree; raises BadRequest for a value that a file cannot hold."""
-    if depth > MAX_DEPTH:
-        raise BadRequest(f"{place}: nested more than {MAX_DEPTH} levels deep")
+def _of_python(value: object, place: Place, path: KeyPath = ()) -> Node:
+    """A Python value, at ``path``, as part of a tree; raises BadRequest for one that a file cannot
+    hold.
+
+    Dates and times are the texts that ``yaml.safe_load`` made them of.
+    """
+    if len(path) > MAX_DEPTH:
+        raise BadRequest(f"{place}: {dotted(path[:1])}: nested more than {MAX_DEPTH} levels deep")
     if value is None or isinstance(value, str | bool | int | float):
         return Node(value, place)
+    if isinstance(value, datetime.date):
+        return Node(value.isoformat(), place)
     if isinstance(value, Integral):
         return Node(int(value), place)
     if isinstance(value, Real):
         return Node(float(value), place)
     if isinstance(value, Mapping):
-        below = {str(key): _of_python(child, place, depth + 1) for key, child in value.items()}
+        below = {
+            str(key): _of_python(child, place, (*path, str(key))) for key, child in value.items()
+        }
         return Node(below, place, dict.fromkeys(below, place))
     if isinstance(value, Iterable):
-        return Node([_of_python(child, place, depth + 1) for child in value], place)
-    raise BadRequest(
-        f"{place}: expected a number, a text, a list or a mapping, got {type(value).__name__}"
-    )
+        entries = [_of_python(child, place, (*path, row)) for row, child in enumerate(value)]
+        return Node(entries, place)
+    where = ": ".join(filter(None, (str(place), dotted(path))))
+    expected = "a number, a text, a date, a list or a mapping"
+    raise BadRequest(f"{where}: expected {expected}, got {type(value).__name__}")
+
+
+def aimed(
+    spacecraft: Spacecraft,
+    doubt: Callable[[str], object],
+    *,
+    target: object = None,
+    spin: object = None,
+    sun: object = None,
+    sun_angle: float | None = None,
+) -> Spacecraft:
+    """Spacecraft with a goal given beside its file, for one command or call.
+
+    ``target``, ``sun``: `nutdamp.units.angles`, right ascension and declination where the file has
+    an attitude, else tilt and azimuth in the frame N; ``spin``: a rate or ``keep``;
+    ``sun_angle``: rad, of a target from the Sun. ``doubt`` is called with the readings of numbers
+    that are hardly meant. Raises SenselessOption.
+    """
+    goal = spacecraft.goal
+    if target is not None:
+        axis = _direction(spacecraft, "target", target, doubt)
+        goal = replace(goal, axis=axis, sun_angle=None)
+    if sun_angle is not None:
+        problem = ""
+        if target is not None:
+            problem = "given together with --target; keep one of the two"
+        elif not 0.0 <= sun_angle <= math.pi:
+            readings = Angles(sun_angle, 0.0).readings
+            problem = "; ".join(("expected an angle of 0 to 180 deg", *readings))
+        elif spacecraft.sun is None:
+            problem = "needs the key sun of the file: [right ascension, declination], or sun: epoch"
+        if problem:
+            raise SenselessOption("sun_angle", shown(sun_angle), problem)
+        axis = spacecraft.at_sun_angle(sun_angle)
+        goal = replace(goal, axis=axis, sun_angle=float(sun_angle))
+    if sun is not None:
+        goal = replace(goal, sun=_direction(spacecraft, "sun", sun, doubt))
+    if spin is not None:
+        rate = spacecraft.spin
+        if not isinstance(spin, str) or spin != "keep":
+            rate = _argument("spin", spin, word, "rate")
+        if rate * spacecraft.spin <= 0.0:
+            problem = f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)"
+            raise SenselessOption("spin", shown(spin), problem)
+        if isinstance(rate, Bare) and (rate.is_integer() or abs(rate) > FASTEST):
+            doubt(f"spin: {reading(rate, 'rate', 'rpm')}")
+        goal = replace(goal, spin=rate)
+    result = replace(spacecraft, goal=goal)
+    object.__setattr__(result, "source", spacecraft.source)
+    return result
+
+
+def _direction(
+    spacecraft: Spacecraft, name: str, value: object, doubt: Callable[[str], object]
+) -> Vector:
+    """The unit vector (3,) that two angles name, inertial; raises SenselessOption where they name
+    none.
+    """
+    pair = _argument(name, value, angles, "right ascension")
+    in_sky = spacecraft.attitude is not None
+    if abs(pair.second) <= 0.5 * math.pi if in_sky else 0.0 <= pair.first < math.pi:
+        for text in pair.readings:
+            doubt(f"{name}: {text}")
+        return attitude.on_sphere(*pair) if in_sky else spacecraft.direction_in_n(*pair)
+    problem = "expected a declination of -90 deg to 90 deg"
+    if not in_sky:
+        problem = "expected a tilt of at least 0 and below 180 deg"
+    raise SenselessOption(name, shown(value), "; ".join((problem, *pair.readings)))
+
+
+def _argument(
+    name: str, value: object, read: Callable[[object, str], Argument], kind: str
+) -> Argument:
+    """The value as ``read``; raises SenselessOption."""
+    try:
+        return read(value, kind)
+    except ValueError as wrong:
+        raise SenselessOption(name, shown(value), str(wrong)) from None
 
 
 def edited(

@@ -8,27 +8,32 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import IO, Any, NamedTuple, Protocol, TypeVar
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
+from nutdamp.common.results import Table
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
-from nutdamp.files.tabular import csv_text, whole_file
+from nutdamp.files.tabular import csv_text, structured, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
-from nutdamp.montecarlo.statistics import Array
-from nutdamp.montecarlo.study import Study
+from nutdamp.montecarlo.statistics import EXACT_CASES, Array
+from nutdamp.montecarlo.study import Results, Study
 from nutdamp.physics.attitude import PRECESSED
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
+
+if TYPE_CHECKING:
+    from nutdamp.planning.screening import Dispersion
 
 SCRIPT = Path(__file__).parents[1] / "data" / "basilisk.txt"  # of `str.format`
 LONGEST_STEP = 0.1  # rad; the body turns by no more in one step of the script
@@ -261,40 +266,87 @@ def column(entry: DispersedInput) -> str:
     return f"{entry.name.replace(' ', '_')}_{SUFFIXES.get(entry.unit, entry.unit)}"
 
 
-class SamplesWriter:
-    """Writer of one row a case: number from 1, true inputs, outputs, angles to cones, spin error;
-    angles in degrees.
+def sample_header(study: Study) -> list[str]:
+    """Columns of cases: number, true inputs, outputs, angles to cones, spin error."""
+    return ["case", *map(column, study.model.inputs.drawn), *output_header(study)]
+
+
+def output_header(study: Study) -> list[str]:
+    """Columns of `Results.values`."""
+    spacecraft = study.model.spacecraft
+    spin = [] if spacecraft.goal.spin is None else ["spin_error_rad_s"]
+    return [*OUTPUT_COLUMNS, *cone_columns(spacecraft), *spin]
+
+
+def sample_columns(study: Study, first: int, values: Array) -> list[NDArray[Any]]:
+    """Values of `sample_header` of the cases from ``first`` (from 0) on, with their
+    `Results.values`; they count from 1, angles are in degrees.
     """
+    cases = np.arange(first, first + values.shape[1])
+    draws = study.draws_of_all(cases)
+    columns: list[NDArray[Any]] = [cases + 1]
+    for entry in study.model.inputs.drawn:
+        truth = np.broadcast_to(entry.nominal + draws[entry.name], len(cases))
+        columns.append(np.degrees(truth) if entry.unit == "rad" else truth)
+    return [*columns, *in_degrees(output_header(study), values)]
+
+
+def in_degrees(names: Sequence[str], rows: Iterable[Array]) -> list[Array]:
+    """Rows, in SI, in the units of the columns ``names``."""
+    return [
+        np.degrees(row) if name.endswith("_deg") else row
+        for name, row in zip(names, rows, strict=True)
+    ]
+
+
+def samples_array(flown: Dispersion) -> Table:
+    """One row a case; raises BadRequest where the cases were counted and not kept."""
+    return structured(
+        sample_header(flown.core.study), sample_columns(flown.core.study, 0, _values(flown.core))
+    )
+
+
+def samples_file(flown: Dispersion) -> Callable[[IO[bytes]], None]:
+    """Writer of the rows of `samples_array`; raises as that does."""
+    values = _values(flown.core)
+    return lambda stream: SamplesWriter(stream, flown.core.study).write(0, values)
+
+
+def _values(core: Results) -> Array:
+    if core.values is None:
+        counted = f"more than {EXACT_CASES:,} cases are counted and not kept"
+        raise BadRequest(f"{counted}: name a file for them, nutdamp.disperse(plan, csv=…)")
+    return core.values[:, : core.done]
+
+
+def percentiles_array(flown: Dispersion, levels: Sequence[float]) -> Table:
+    """One row a level, %, of each output, NaN where it is not known."""
+    names = output_header(flown.core.study)
+    shares = np.array(levels) / 100.0
+    unknown = np.full(len(shares), math.nan)
+    spreads = map(flown.core.spread_of, range(len(names)))
+    rows = [unknown if spread is None else spread.quantiles(shares) for spread in spreads]
+    return structured(["percent", *names], [np.array(levels), *in_degrees(names, rows)])
+
+
+class SamplesWriter:
+    """Writer of one row a case, see `sample_columns`."""
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
-        self._stream = stream
-        self._study = study
-        self._inputs = study.model.inputs.drawn
-        spacecraft = study.model.spacecraft
-        self._outputs = [*OUTPUT_COLUMNS, *cone_columns(spacecraft)]
-        if spacecraft.goal.spin is not None:
-            self._outputs.append("spin_error_rad_s")
-        header = ["case", *(column(entry) for entry in self._inputs), *self._outputs]
-        stream.write(csv_text(header, []).encode())
+        self._stream, self._study = stream, study
+        stream.write(csv_text(sample_header(study), []).encode())
         stream.flush()  # a full disk is better reported before the first case is flown
 
     def write(self, first: int, values: Array) -> None:
         """The cases from ``first`` (from 0) on, with their `Results.values`."""
         for begin in range(0, values.shape[1], BLOCK):  # texts of all would take much memory
             part = values[:, begin : begin + BLOCK]
-            cases = np.arange(first + begin, first + begin + part.shape[1])
-            draws = self._study.draws_of_all(cases)
-            columns = [list(map(str, (cases + 1).tolist()))]
-            for entry in self._inputs:
-                truth = np.broadcast_to(entry.nominal + draws[entry.name], len(cases))
-                columns.append(_texts(np.degrees(truth) if entry.unit == "rad" else truth))
-            for name, row in zip(self._outputs, part, strict=True):
-                columns.append(_texts(np.degrees(row) if name.endswith("_deg") else row))
+            columns = map(_texts, sample_columns(self._study, first + begin, part))
             lines = map(",".join, zip(*columns, strict=True))
             self._stream.write(("\r\n".join(lines) + "\r\n").encode())
 
 
-def _texts(values: Array) -> list[str]:
+def _texts(values: NDArray[Any]) -> list[str]:
     """Numbers that read back as they were; NaN is empty."""
     return [""] * len(values) if math.isnan(values[0]) else list(map(repr, values.tolist()))
 

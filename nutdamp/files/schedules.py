@@ -253,7 +253,11 @@ def read_plan(
     else:
         pulses, warnings = read_pulses(table, spacecraft)
     plan = Plan(
-        spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True
+        spacecraft,
+        printable(str(path)),
+        pulses,
+        options=options or SchemeOptions(),
+        _from_file=True,
     )
     return plan, (*warnings, *broken_limits(spacecraft, pulses))
 

@@ -165,9 +165,13 @@ HEADER = (
 )
 
 
-ROW = np.dtype(
-    [(name, np.int64 if name == "pulse" else np.float64) for name in HEADER]
-)  # one row of the track
+def structured(names: Sequence[str], columns: Sequence[NDArray[Any]]) -> NDArray[np.void]:
+    """Structured array of columns (n,) of these names."""
+    kinds = [(name, column.dtype) for name, column in zip(names, columns, strict=True)]
+    rows = np.empty(len(columns[0]), dtype=kinds)
+    for name, column in zip(names, columns, strict=True):
+        rows[name] = column
+    return rows
 
 
 def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
@@ -178,11 +182,7 @@ def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
     cones = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
     vectors = map(cleaned, (turned.rates, turned.quaternion, track.axis, track.momentum))
     table = np.column_stack([track.t, *vectors, cones])
-    rows = np.empty(len(track.t), dtype=ROW)
-    for name, column in zip(HEADER[:-1], table.T, strict=True):
-        rows[name] = column
-    rows["pulse"] = track.pulse
-    return rows
+    return structured(HEADER, [*table.T, track.pulse])
 
 
 def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) -> None:

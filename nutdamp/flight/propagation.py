@@ -37,17 +37,21 @@ PIECE = 20_000  # rows of a track that are held at a time where many are written
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Motion over n rows, in principal axes."""
+    """Motion over n rows, in principal axes: times ``t`` (n,) s; ``rates`` (n, 3) rad/s;
+    ``quaternion`` (n, 4), body -> inertial, scalar first; spin ``axis`` (n, 3) and ``momentum``
+    (n, 3) N m s, inertial; ``nutation``, ``body_cone`` and ``space_cone`` (n,) rad; ``pulse`` (n,),
+    pulses completed.
+    """
 
-    t: Array  # (n,) s
-    rates: Array  # (n, 3) rad/s
-    quaternion: Array  # (n, 4) body -> inertial
-    axis: Array  # (n, 3) spin axis, inertial
-    momentum: Array  # (n, 3) N m s, inertial
-    nutation: Array  # (n,) rad, as are both cones
+    t: Array
+    rates: Array
+    quaternion: Array
+    axis: Array
+    momentum: Array
+    nutation: Array
     body_cone: Array
     space_cone: Array
-    pulse: NDArray[np.int64]  # (n,) pulses completed
+    pulse: NDArray[np.int64]
 
 
 def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
@@ -110,14 +114,17 @@ def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """Residual after the last pulse, rad."""
+    """Residual after the last pulse by a ``model``, rad: largest ``nutation`` on the following arc,
+    ``body_cone`` and signed ``space_cone`` at that instant; ``momentum_shift`` of H from where it
+    was at t = 0, its ``axis_error`` from the target axis.
+    """
 
-    nutation: float  # largest on the following arc
-    body_cone: float  # at that instant
-    space_cone: float  # signed
-    momentum_shift: float  # of H from where it was at t = 0
-    axis_error: float  # of H from the target axis
-    model: str = field(default=REAL_WIDTHS, compare=False)  # by which it was found
+    nutation: float
+    body_cone: float
+    space_cone: float
+    momentum_shift: float
+    axis_error: float
+    model: str = field(default=REAL_WIDTHS, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,9 +134,7 @@ class Final:
     axis: Vector  # spin axis, inertial unit vector (3,)
     momentum: Vector  # direction of H, the same
     spin: float  # ω3, rad/s
-    nutation: (
-        float  # as in `Residual`, rad: the half-angle at which the axis goes round H from then on
-    )
+    nutation: float  # as in `Residual`, rad: half-angle at which the axis goes round H from then on
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,20 +155,25 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight(Tabled):
-    """Flight of a schedule by one ``model``."""
+    """Flight of the ``schedule`` of a ``spacecraft`` by one ``model``.
+
+    ``legs`` in order; ``settled``: rates, rad/s, and quaternion just after the end of the last
+    pulse; ``moments``, kg m², at t = 0; ``spans``: times, s, between which each pulse acts, its
+    centre twice for impulses. ``until``: end of the rows it is shown by, s, None: that of its last
+    leg; ``samples``: even times among these, besides rows just before and after each pulse;
+    ``scheme``: by which it was planned.
+    """
 
     spacecraft: Spacecraft
     schedule: Schedule
-    legs: tuple[Leg, ...]  # in order
-    settled: SpinState  # just after the end of the last pulse
-    moments: tuple[float, float, float]  # at t = 0
-    spans: tuple[
-        tuple[float, float], ...
-    ]  # times (s) between which each pulse acts, its centre twice for impulses
+    legs: tuple[Leg, ...]
+    settled: SpinState
+    moments: tuple[float, float, float]
+    spans: tuple[tuple[float, float], ...]
     model: str = REAL_WIDTHS
-    until: float | None = None  # end of the rows it is shown by, s; None: that of its last leg
-    samples: int = 1000  # even times among these, besides rows just before and after each pulse
-    scheme: str = ""  # by which it was planned
+    until: float | None = None
+    samples: int = 1000
+    scheme: str = ""
 
     @property
     def steps(self) -> int:

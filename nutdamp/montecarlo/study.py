@@ -472,16 +472,17 @@ class Results(Counted):
 
     def distribution(self, output: str) -> Distribution | None:
         """Distribution of an output; None where it is unknown (propellant)."""
-        return self._row(OUTPUTS.index(output))
+        return self.spread_of(OUTPUTS.index(output))
 
     def spread(self, bound: Bound) -> Distribution | None:
         """Distribution of the value of a bound's part."""
         if bound.keep is not None:
             place = self.study.model.spacecraft.keep.index(bound.keep)
-            return self._row(len(OUTPUTS) + 2 * place + (not bound.inner))
-        return self._row(-1 if bound.part is Part.SPIN else OUTPUTS.index(bound.part.value))
+            return self.spread_of(len(OUTPUTS) + 2 * place + (not bound.inner))
+        return self.spread_of(-1 if bound.part is Part.SPIN else OUTPUTS.index(bound.part.value))
 
-    def _row(self, row: int) -> Distribution | None:
+    def spread_of(self, row: int) -> Distribution | None:
+        """Distribution of a row of `Study.values`; None where it is unknown."""
         if self.values is None:
             return self.sketches[row] if math.isfinite(self.sketches[row].minimum) else None
         values = self.values[row, : self.done]

@@ -153,7 +153,7 @@ class SheetRow(NamedTuple):
 
 def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bool) -> Sheet:
     """One row a pulse or block, as it is commanded, with the nutation after it."""
-    flown, spacecraft, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
+    flown, spacecraft, pulses = plan._flight, plan.spacecraft, plan.pulses.pulses
     blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(pulses)
     own = plan.pulses.pulses_by_block
     counts = [numbers[-1] + 1 for numbers in own]

@@ -207,7 +207,7 @@ def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, .
     """Command that writes the rows of a plan; none where no scheme by its name and no file gives
     its pulses.
     """
-    if plan.from_file:
+    if plan._from_file:
         option = "--blocks" if plan.pulses.blocks else "--schedule"
         pulses = [f"{option} {shlex.quote(plan.scheme)}"]
     elif plan.scheme in SCHEMES and plan.spacecraft.goal.sun is None:

@@ -281,7 +281,7 @@ def report_page(
         )
         if chosen is not None:
             broken = (
-                broken_limits(spacecraft, chosen.pulses) if chosen.from_file else []
+                broken_limits(spacecraft, chosen.pulses) if chosen._from_file else []
             )  # schemes break none
             page = replace(
                 page,
@@ -461,7 +461,7 @@ def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterat
     chosen = compared.recommended
     if chosen is not None:
         ends = document.facts_of("Final state", glance.end_facts(chosen))
-        fired = pulse_table(chosen.flight, scheme=chosen.scheme)
+        fired = pulse_table(chosen._flight, scheme=chosen.scheme)
         yield Details("Pulses and final state, all values", (document.sheet(fired), ends))
     yield Details("Method and symbols", tuple(_method(compared)))
     yield Details("Assumptions", (Points(tuple(("", limit) for limit in assumptions(compared))),))

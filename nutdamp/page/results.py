@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from functools import partial
 from os import PathLike
 from typing import IO, TYPE_CHECKING, Any
@@ -22,13 +23,14 @@ from nutdamp.views.decisions import comparison_json
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.parts import pulse_table
 from nutdamp.views.tables import DataTable
-from nutdamp.views.text import degrees, joined, sentences
+from nutdamp.views.text import degrees, joined, sentence, sentences
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.page.document import Block
     from nutdamp.planning.robust import RobustComparison
+    from nutdamp.planning.screening import Dispersion
 
 
 VIEWS = {
@@ -37,7 +39,7 @@ VIEWS = {
     "Spacecraft.data": "views.decisions:spacecraft_json",
     **{
         f"{kind}.{what}": f"page.results:{what}"
-        for kind in ("Spacecraft", "Plan", "Comparison", "Flight", "Simulation")
+        for kind in ("Spacecraft", "Plan", "Comparison", "Flight", "Simulation", "RobustComparison")
         for what in ("line", "html")
     },
     **{
@@ -59,6 +61,10 @@ VIEWS = {
     "Trade.csv": "views.trade:trade_csv",
     "Trade.figure": "figures.studies:trade_figure",
     "Trade.screen": "views.trade:trade_screen",
+    "Dispersion.html": "page.results:html",
+    "Dispersion.table": "files.export:samples_array",
+    "Dispersion.csv": "files.export:samples_file",
+    "Dispersion.percentiles": "files.export:percentiles_array",
     "Dispersion.data": "views.dispersion:dispersion_json",
     "Dispersion.figure": "figures.studies:dispersion_figure",
     "Dispersion.screen": "views.dispersion:dispersion_screen",
@@ -73,6 +79,8 @@ VIEWS = {
     "Fitted.data": "views.fit:fit_json",
     "Fitted.figure": "figures.signals:fit_figure",
     "Fit.text": "files.carried:fitted_text",
+    "Plan.former": "page.results:former",
+    "Plan.simulated": "api:simulate",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
     "Verified.data": "views.simulation:verification_json",
@@ -107,7 +115,7 @@ def robust_data(robust: RobustComparison) -> dict[str, Any]:
 def _rows(result: Plan | Comparison) -> DataTable:
     if isinstance(result, Comparison):
         return scheme_table(result, result.recommended)
-    return pulse_table(result.flight)
+    return pulse_table(result._flight, scheme=result.scheme)
 
 
 def table(result: Plan | Comparison | Flight | Simulation) -> results.Table:
@@ -177,8 +185,12 @@ def write(_: object, path: str | PathLike[str], text: str) -> None:
     write_whole(units.path("path", path), text)
 
 
-def line(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str:
+def line(
+    result: Spacecraft | Plan | Flight | Comparison | Simulation | RobustComparison,
+) -> str:
     """Summary of a result in one line."""
+    if not isinstance(result, Spacecraft | Plan | Flight | Comparison | Simulation):
+        return line(result.joined)
     if isinstance(result, Simulation):
         return line(result.shown)
     if isinstance(result, Spacecraft):
@@ -192,9 +204,8 @@ def line(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str:
         )
         return f"<Comparison of {', '.join(plan.scheme for plan in result)}: {verdict}>"
     if isinstance(result, Flight):
-        residual = result.residual
-        shift = degrees(residual.momentum_shift)
-        ended = f"nutation left {degrees(residual.nutation)}, momentum shift {shift}"
+        nutation, shift = map(degrees, (result.residual.nutation, result.residual.momentum_shift))
+        ended = f"nutation left {nutation}, momentum shift {shift}"
         return f"<Flight of {_summary(result)}: {ended}>"
     if result.flown is None:
         return f"<Plan {result.scheme}: infeasible, {result.why}>"
@@ -205,55 +216,90 @@ def line(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str:
     return f"<Plan {result.scheme}: {ended}>"
 
 
-def html(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str | None:
-    """HTML table of a result for notebooks, with the picture of its motion; None without the extra
-    plot.
+def html(
+    result: Spacecraft | Plan | Flight | Comparison | Simulation | Dispersion | RobustComparison,
+) -> str | None:
+    """HTML of a result for notebooks: headline and bounds of what is judged, a table, and a picture
+    beside them; None without the extra plot.
     """
-    if isinstance(result, Simulation):
-        return html(result.shown)
     from nutdamp.figures.image import svg
     from nutdamp.page.report import block_html
+    from nutdamp.planning.screening import Dispersion
 
+    if isinstance(result, Simulation):
+        return html(result.shown)
+    if not isinstance(result, Spacecraft | Plan | Flight | Comparison | Dispersion):
+        return html(result.joined)
     try:
-        table = block_html(_block(result))
+        shown = "".join(map(block_html, _blocks(result)))
     except MissingExtra:
         return None
-    moves = result.recommended if isinstance(result, Comparison) else result
-    if (
-        moves is None
-        or isinstance(moves, Spacecraft)
-        or (isinstance(moves, Plan) and not moves.feasible)
-    ):
-        return table
+    if isinstance(result, Spacecraft):
+        return shown
+    named = () if isinstance(result, Dispersion) or hasattr(result, "flown_run") else ("motion",)
     try:
-        picture = svg(moves.figure("motion"))
-    except MissingExtra:
-        return table
-    # The picture is beside the table, or below where there is no room.
+        picture = svg(result.figure(*named))
+    except (Infeasible, MissingExtra):
+        return shown
+    # The picture is beside the tables, or below where there is no room.
     return (
         '<div style="display: flex; flex-wrap: wrap; gap: 1.5rem; align-items: flex-start">'
-        f'<div>{table}</div><div style="flex: 1 1 26rem; max-width: 44rem">{picture}</div></div>'
+        f'<div>{shown}</div><div style="flex: 1 1 26rem; max-width: 44rem">{picture}</div></div>'
     )
 
 
-def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
+def _blocks(result: Spacecraft | Plan | Flight | Comparison | Dispersion) -> Iterator[Block]:
     from nutdamp.page.document import FactList, Prose, facts_of, sheet
+    from nutdamp.views import dispersion, verdict
     from nutdamp.views.parts import derived_table
 
     if isinstance(result, Spacecraft):
-        return facts_of(result.name, derived_table(result))
-    if isinstance(result, Comparison):
-        return sheet(scheme_table(result, result.recommended))
+        yield facts_of(result.name, derived_table(result))
+        return
     if isinstance(result, Flight):
-        names = ("nutation", "body_cone", "space_cone", "momentum_shift")
         rows = tuple(
-            (name.replace("_", " "), degrees(getattr(result.residual, name))) for name in names
+            (name.replace("_", " "), degrees(getattr(result.residual, name)))
+            for name in ("nutation", "body_cone", "space_cone", "momentum_shift")
         )
-        return FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
-    if not result.feasible:
-        return Prose(repr(result)[1:-1])
-    return sheet(pulse_table(result.flight, scheme=result.scheme))
+        yield FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
+        return
+    judged = result.verdict
+    about = "".join(verdict.headline(judged, result if isinstance(result, Comparison) else None))
+    stated = "" if judged.why else f". {sentence(verdict.statement(judged))}"
+    of_loop = verdict.loop_sentence(judged) if hasattr(result, "flown_run") else ""
+    yield Prose(of_loop or about + stated)
+    if judged.lines:
+        yield sheet(verdict.bound_table(judged))
+    if isinstance(result, Plan | Comparison):
+        if not isinstance(result, Plan) or result.feasible:
+            yield sheet(_rows(result))
+    else:
+        nominal = result.core.study.outputs_of({})
+        table = dispersion.percentile_table(result.core, dispersion.FLOWN_OUTPUTS, nominal)
+        yield sheet(table, "screen")
 
 
 def _summary(flight: Flight) -> str:
     return f"{len(flight.schedule)} pulses until {flight.shown_to:.4g} s by {flight.model}"
+
+
+FORMER = {
+    **{"remarks": "notes", "to_numpy": "numpy.asarray(plan)", "flight": "fly()"},
+    "to_pandas": "pandas.DataFrame(numpy.asarray(plan))",
+    **{"refusal": "why", "left": "flown", "held": "verdict.lines", "shortfalls": "verdict.lines"},
+    **dict.fromkeys(("failure", "breach", "astray", "worse", "worse_at", "from_file", "cut"), ""),
+    **dict.fromkeys(("found_none", "carried_at", "reaching", "disturbed", "commandable"), ""),
+    **dict.fromkeys(("ends_well", "standing", "severity", "spin_change", "delta_v"), ""),
+    **{"aspects": "verdict.aspects", "kept": "verdict.lines"},
+}
+"""Names of `Plan` that were public to version 0.3, and what to write for some."""
+
+
+def former(result: Plan, name: str) -> Any:
+    """Attribute of a plan by its former name, with a warning; AttributeError for any other."""
+    if name not in FORMER:
+        raise AttributeError(f"{type(result).__name__!r} object has no attribute {name!r}")
+    instead = f": {FORMER[name]} has it" if FORMER[name] else ""
+    warning = f"{name} of a plan goes with version 0.5{instead}"
+    warnings.warn(warning, DeprecationWarning, stacklevel=4)  # of who asks the plan
+    return getattr(result, "notes" if name == "remarks" else f"_{name}")

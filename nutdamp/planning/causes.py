@@ -24,23 +24,23 @@ CUT = "the search ended at its limit of work"
 
 def infeasibility(plan: Plan) -> str:
     """Reason for the lack of a schedule; empty where there is one."""
-    if plan.breach is not None:
-        why = f"the only schedule found breaks a limit: {_broken(plan.breach)}"
-    elif plan.astray is not None:
-        why = strays(plan.astray)
-        if math.isfinite(plan.astray.least_at):
+    if plan._breach is not None:
+        why = f"the only schedule found breaks a limit: {_broken(plan._breach)}"
+    elif plan._astray is not None:
+        why = strays(plan._astray)
+        if math.isfinite(plan._astray.least_at):
             why += "; no way round it was found within the limits"
-    elif plan.worse is not None:
-        why = f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
-        decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
+    elif plan._worse is not None:
+        why = f"the best schedule found would leave {math.degrees(plan._worse):.3g}° of nutation"
+        decayed = requirements.decayed(plan.spacecraft, plan._worse_at)
         if decayed < plan.spacecraft.nutation:
             why += (
-                f" at {plan.worse_at:.4g} s; without a pulse it decays to "
+                f" at {plan._worse_at:.4g} s; without a pulse it decays to "
                 f"{math.degrees(decayed):.3g}° by then"
             )
     else:
-        why = plan.refusal or ""
-    return f"{why}; {CUT}" if why and plan.cut else why
+        why = plan._refusal or ""
+    return f"{why}; {CUT}" if why and plan._cut else why
 
 
 def strays(aspect: Aspect) -> str:
@@ -131,7 +131,7 @@ def remaining(plan: Plan) -> Note:
     """Nutation that remains, and the dominant obstacle to less of it."""
     spacecraft, nutation, (certain, possible) = (
         plan.spacecraft,
-        plan.flight.residual.nutation,
+        plan._flight.residual.nutation,
         hindrances(plan),
     )
     left = math.degrees(nutation)
@@ -172,9 +172,9 @@ def main_causes(verdict: Verdict) -> Iterator[Note]:
 
 def shortfalls(plan: Plan, *, tabulated: bool) -> Iterator[Note]:
     """Bounds that the end of a plan breaks; ``tabulated``: but those required."""
-    left = plan.left
+    left = plan._left
     assert left is not None
-    for bound in plan.shortfalls:
+    for bound in plan._shortfalls:
         if bound.required and tabulated:
             continue
         if bound.part is Part.SPIN:

@@ -112,10 +112,10 @@ def recommend(
     if not feasible:
         return Recommendation()
     enough = {plan for plan in feasible if not cases or cases[plan].enough}
-    reached = {plan: plan.standing if plan in enough else Standing.MISSES for plan in feasible}
+    reached = {plan: plan._standing if plan in enough else Standing.MISSES for plan in feasible}
     standing = next(standing for standing in Standing if standing in reached.values())
     those = [plan for plan in feasible if reached[plan] is standing]
-    those = [plan for plan in those if plan.kept is not False] or those
+    those = [plan for plan in those if plan._kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those, least=least)
         gains = _alternatives(best, those)
@@ -183,11 +183,11 @@ def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     if len(as_little) == 1:
         return as_little[0], Ground.LEFT
     spacecraft = as_little[0].spacecraft
-    least = min(plan.severity for plan in as_little)
+    least = min(plan._severity for plan in as_little)
     rounding = NEGLIGIBLE / min(
         (bound.limit for bound in required(spacecraft) if bound.part is not Part.SPIN), default=1.0
     )
-    near = [plan for plan in as_little if plan.severity <= least * (1.0 + SAME_COST) + rounding]
+    near = [plan for plan in as_little if plan._severity <= least * (1.0 + SAME_COST) + rounding]
     return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
 
 
@@ -238,7 +238,7 @@ def _unit(plans: Sequence[Plan]) -> str:
 
 def speed(plan: Plan) -> float | None:
     """|ΔV| in m/s; None where unknown."""
-    return None if plan.delta_v is None else math.hypot(*plan.delta_v.tolist())
+    return None if plan._delta_v is None else math.hypot(*plan._delta_v.tolist())
 
 
 def _off(plan: Plan) -> float:
@@ -264,8 +264,8 @@ classic scheme.
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(results.Data, results.Tabled):
-    """Plans for one spacecraft, and the recommended one; ``comparison["two-pulse"]`` is one of
-    them.
+    """The ``plans`` for a ``spacecraft``, and the recommended one; ``comparison["two-pulse"]`` is
+    one of them.
 
     ``flown``: the feasible ones in dispersed cases; None where these were not to be flown.
     ``named``: their schemes were; ``timed``: pulses may be timed one by one though the spacecraft
@@ -306,7 +306,7 @@ class Comparison(results.Data, results.Tabled):
         if self.preferred is None:
             return recommend(self.eligible, self.cases, self.least)
         standing = (
-            self.preferred.standing
+            self.preferred._standing
             if self.verdicts[self.preferred].met is not False
             else Standing.MISSES
         )
@@ -320,7 +320,7 @@ class Comparison(results.Data, results.Tabled):
         any of them.
         """
         return not self.timed and (
-            not self.named or any(plan.feasible and plan.commandable for plan in self.plans)
+            not self.named or any(plan.feasible and plan._commandable for plan in self.plans)
         )
 
     @property
@@ -329,7 +329,7 @@ class Comparison(results.Data, results.Tabled):
         return tuple(
             plan
             for plan in self.plans
-            if plan.feasible and (plan.commandable or not self.only_commanded)
+            if plan.feasible and (plan._commandable or not self.only_commanded)
         )
 
     @property
@@ -403,7 +403,7 @@ class Comparison(results.Data, results.Tabled):
         missed = next((line for line in verdict.lines if not line.bound.met(line.nominal)), None)
         if missed is not None:
             return note_on(missed)
-        if not plan.commandable and self.only_commanded:
+        if not plan._commandable and self.only_commanded:
             return note("why-single-pulses")
         cases = verdict.cases
         if requirements.judged(self.spacecraft) and self.flown is not None:
@@ -450,7 +450,7 @@ class Comparison(results.Data, results.Tabled):
                         plan = attempt(spacecraft, plan.scheme, aware)
                     others = (*others, plan)
                 best = replace(self, plans=others, flown=None, preferred=None).recommended
-                if best is not None and best.standing is Standing.COMPLIES:
+                if best is not None and best._standing is Standing.COMPLIES:
                     break
         except NutdampError:
             return None
@@ -459,7 +459,7 @@ class Comparison(results.Data, results.Tabled):
     @property
     def failed(self) -> tuple[Plan, ...]:
         """Plans whose scheme has a bug."""
-        return tuple(plan for plan in self.plans if plan.failure is not None)
+        return tuple(plan for plan in self.plans if plan._failure is not None)
 
 
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
@@ -569,11 +569,11 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
         planned = plan(spacecraft, scheme, options)
         # Judged here, where a failure is that of this scheme alone, and not when the first figure
         # is shown.
-        _ = planned.residual, planned.delta_v
+        _ = planned.residual, planned._delta_v
     except NutdampError:
         raise
     except Exception as failure:
-        return Plan(spacecraft, scheme, None, f"{BUG}: {type(failure).__name__}", failure=failure)
+        return Plan(spacecraft, scheme, None, f"{BUG}: {type(failure).__name__}", _failure=failure)
     return planned
 
 

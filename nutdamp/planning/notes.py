@@ -73,15 +73,15 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
         from nutdamp.planning.causes import infeasibility  # no plan
 
         why = infeasibility(plan)
-        if plan.found_none:
+        if plan._found_none:
             return (note("not-found", scheme=plan.scheme, why=why),)
         return (note("infeasible", scheme=plan.scheme, why=why),)
     notes = list(plan.pulses.notes)
-    if plan.cut:
+    if plan._cut:
         notes.append(note("search-ended"))
     if plan.flown is not None and len(plan.pulses):
         notes += [*_bounds(plan), *_left(plan)]
-        broken = [aspect for aspect in plan.aspects if cones and not aspect.kept]
+        broken = [aspect for aspect in plan._aspects if cones and not aspect.kept]
         notes += map(broken_cone, broken)
     return tuple(entry.of(plan.scheme) for entry in notes)
 
@@ -121,10 +121,10 @@ def _left(plan: Plan) -> Iterator[Note]:
     spacecraft, options, left, inertia = (
         plan.spacecraft,
         plan.options,
-        plan.left,
+        plan._left,
         plan.spacecraft.inertia,
     )
-    nutation = plan.flight.residual.nutation
+    nutation = plan._flight.residual.nutation
     if nutation >= TELLING and not options.uncorrected:
         spared = spacecraft.goal.spin is not None or plan.scheme == ROBUST
         if spared and plan.meets_requirement:
@@ -169,7 +169,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     firing.
     """
     spacecraft = plan.spacecraft
-    flight = verdict.flight or plan.flight
+    flight = verdict.flight or plan._flight
     final = flight.residual
     if verdict.unshown:
         yield note(
@@ -199,7 +199,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     if verdict.status.barred:
         single = spacecraft.commands is not None and not plan.pulses.blocks
         yield note("not-commandable" if single else "breaks-limits", scheme=plan.scheme)
-    disturbed = plan.disturbed
+    disturbed = plan._disturbed
     if disturbed is not None:
         yield note(
             "disturbed-after",
@@ -332,9 +332,9 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
     complies = compared.recommendation.standing is Standing.COMPLIES
     if not complies:
         yield from _missed(chosen, compared, tabulated=tabulated)
-    broken = [aspect for aspect in chosen.aspects if not aspect.kept]
+    broken = [aspect for aspect in chosen._aspects if not aspect.kept]
     yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if not tabulated)
-    keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
+    keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan._kept]
     if broken and keeping:
         yield note("plans-keep-cones", schemes=", ".join(keeping))
     if compared.spacecraft.watched:
@@ -344,11 +344,11 @@ def comparison_warnings(compared: Comparison, *, tabulated: bool = False) -> Ite
             if not aspect.kept:
                 items = (item for item in broken_cone(aspect).items if item[0] != "at_s")
                 yield Note("cone-broken-at-start", tuple(items))
-    others = [plan.scheme for plan in compared.plans if plan.feasible and not plan.commandable]
+    others = [plan.scheme for plan in compared.plans if plan.feasible and not plan._commandable]
     better = [scheme for scheme in others if compared.verdicts[compared[scheme]].met]
-    if better and chosen.commandable and compared.verdicts[chosen].met is False:
+    if better and chosen._commandable and compared.verdicts[chosen].met is False:
         yield note("blocks-cannot", schemes=", ".join(better))
-    cut = [plan.scheme for plan in compared.plans if plan.cut]
+    cut = [plan.scheme for plan in compared.plans if plan._cut]
     if cut and not complies:
         yield note("search-incomplete", schemes=", ".join(cut))
 
@@ -357,12 +357,12 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
     """Requirements that the recommended plan misses, and the causes, the best cure first."""
     cases = compared.verdicts[chosen].cases
     if (
-        chosen.standing is not Standing.MISSES
+        chosen._standing is not Standing.MISSES
         and compared.cases
         and not compared.cases[chosen].enough
     ):
         if (
-            chosen.kept is not False and cases is not None and cases.enough is False
+            chosen._kept is not False and cases is not None and cases.enough is False
         ):  # else the cones are the reason
             yield note(
                 "too-few-cases" if compared.preferred is None else "too-few-cases-robust",
@@ -374,12 +374,12 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
 
     yield from shortfalls(chosen, tabulated=tabulated)
     spacecraft = chosen.spacecraft
-    parts = {bound.part for bound in chosen.shortfalls}
+    parts = {bound.part for bound in chosen._shortfalls}
     if spacecraft.disturbances and not chosen.options.with_disturbances:
         aware = compared.with_disturbances
         if aware is None:
             yield note("unplanned-disturbances")
-        elif aware.standing is Standing.COMPLIES:
+        elif aware._standing is Standing.COMPLIES:
             yield note("disturbances-helped", scheme=aware.scheme)
         else:
             yield note("disturbances-not-helped")
@@ -473,7 +473,7 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         yield note("made-for-cases" if complies else "made-for-most-cases")
     elif recommendation.standing is not Standing.COMPLIES:
         yield note("nearest" if ground is Ground.NEAREST else "least-left", count=count)
-    elif recommendation.plan.kept is False:
+    elif recommendation.plan._kept is False:
         yield note("cheapest-at-end", count=count)
     elif not requirements.required(spacecraft):
         yield note("damps-at-least", count=count)

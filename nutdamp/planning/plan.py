@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import results, work
@@ -26,6 +26,7 @@ from nutdamp.spacecraft.roles import as_known
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
+    import nutdamp
     from nutdamp.flight.cones import Aspect
 
 NO_NUTATION = 1e-12  # rad of nutation below which there is nothing to plan
@@ -41,30 +42,29 @@ class Standing(Enum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan(results.Data, results.Tabled):
-    """Schedule of a scheme for a spacecraft, and its judgement.
+class Plan(results.Data, results.Rows):
+    """``schedule`` of a ``scheme`` for a ``spacecraft``, and its judgement; None where infeasible.
 
-    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule
-    found, or the cone that the spin axis would break (``astray``) on its way to a target, or the
-    nutation (rad) that would be left where that is ``worse`` than without pulses, at ``worse_at``
-    s. `nutdamp.planning.decision` has the words of all four. ``failure``: the exception of a scheme
-    that has a bug; ``from_file``: the pulses were read, no scheme planned them. ``cut``: its search
+    ``options``: those of the scheme that it was planned with. Without a schedule one of these is
+    why, in the words of `nutdamp.planning.causes`: ``_refusal``, ``_breach`` of a limit, a cone
+    that the axis breaks (``_astray``), nutation that gets ``_worse``, rad, at ``_worse_at`` s.
+    ``_failure``: the exception of a bug; ``_from_file``: read, not planned; ``_cut``: its search
     ended at its budget of `work`.
     """
 
     spacecraft: Spacecraft
     scheme: str
     schedule: Schedule | None
-    refusal: str | None = None
+    _refusal: str | None = None
     options: catalogue.SchemeOptions = field(default_factory=catalogue.SchemeOptions)
-    failure: Exception | None = None
-    breach: Breach | None = None
-    astray: Aspect | None = None
-    worse: float | None = None
-    worse_at: float = 0.0
-    from_file: bool = False
-    cut: bool = False
-    found_none: bool = False
+    _failure: Exception | None = None
+    _breach: Breach | None = None
+    _astray: Aspect | None = None
+    _worse: float | None = None
+    _worse_at: float = 0.0
+    _from_file: bool = False
+    _cut: bool = False
+    _found_none: bool = False
 
     @property
     def feasible(self) -> bool:
@@ -82,7 +82,7 @@ class Plan(results.Data, results.Tabled):
         return None if self.feasible else str(results.view(self, "reason"))
 
     @property
-    def remarks(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
         """Notes for the reader."""
         return tuple(results.view(self, "sentences"))
 
@@ -107,6 +107,12 @@ class Plan(results.Data, results.Tabled):
     def __bool__(self) -> bool:
         return True  # a plan without pulses is one
 
+    if not TYPE_CHECKING:  # or else a type checker would believe in any name
+        _to_numpy, _to_pandas = results.Tabled.to_numpy, results.Tabled.to_pandas
+
+        def __getattr__(self, name: str) -> Any:
+            return results.view(self, "former", name)  # or AttributeError
+
     def fly(
         self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False
     ) -> Flight:
@@ -127,8 +133,17 @@ class Plan(results.Data, results.Tabled):
             seen_at(fly(self.spacecraft, schedule, end), end), samples=count, scheme=self.scheme
         )
 
+    def simulate(
+        self, until: float | None = None, *, flown: bool = False, samples: int = 1000
+    ) -> nutdamp.Simulation:
+        """Propagate the plan as `nutdamp.simulate` does."""
+        simulated: nutdamp.Simulation = results.view(
+            self, "simulated", until, flown=flown, samples=samples
+        )
+        return simulated
+
     @property
-    def carried_at(self) -> float:
+    def _carried_at(self) -> float:
         """Time, s, from which the spacecraft is carried on by default."""
         return self.end
 
@@ -139,11 +154,11 @@ class Plan(results.Data, results.Tabled):
         Raises BadRequest for a spacecraft not read from a file, while a pulse is on, and for a time
         that is none.
         """
-        time = self.carried_at if at is None else units.end_of_flight(at)
+        time = self._carried_at if at is None else units.end_of_flight(at)
         spacecraft: Spacecraft = results.view(feasible(self), "carried", time)
         return spacecraft
 
-    def reaching(self, time: float) -> Flight:
+    def _reaching(self, time: float) -> Flight:
         """Flight through the real pulse widths as far as ``time`` s at least."""
         return replace(propagation.flown(self.spacecraft, self.pulses, time), scheme=self.scheme)
 
@@ -157,58 +172,58 @@ class Plan(results.Data, results.Tabled):
         )
 
     @cached_property
-    def flight(self) -> Flight:
+    def _flight(self) -> Flight:
         """Flight through the real pulse widths; free motion where the plan is infeasible."""
         return propagation.flown(self.spacecraft, self.pulses)
 
     @property
     def flown(self) -> Residual | None:
         """Residual of the flight through the real pulse widths."""
-        return self.flight.residual if self.feasible else None
+        return self._flight.residual if self.feasible else None
 
     @cached_property
-    def disturbed(self) -> Left | None:
+    def _disturbed(self) -> Left | None:
         """Residual when the last disturbance has begun or ended, where that is after the last
         pulse.
         """
         last = max(self.spacecraft.edges, default=0.0)
         if not self.feasible or last <= self.end:
             return None
-        return left_by(seen_at(self.reaching(last), last))
+        return left_by(seen_at(self._reaching(last), last))
 
     @property
-    def left(self) -> Left | None:
+    def _left(self) -> Left | None:
         """Flown residual for `requirements`; of nutation and distance the larger one of that and of
         `disturbed`.
         """
         if not self.feasible:
             return None
-        left, after = left_on_the_way(self.flight, self.aspects), self.disturbed
+        left, after = left_on_the_way(self._flight, self._aspects), self._disturbed
         if after is None:
             return left
         nutation, aim = max(left.nutation, after.nutation), max(left.aim, after.aim)
         return left._replace(nutation=nutation, aim=aim)
 
     @cached_property
-    def commandable(self) -> bool:
+    def _commandable(self) -> bool:
         """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes
         such.
 
         Pulses and blocks read from a file have to keep its limits and commands too.
         """
         spacecraft, pulses = self.spacecraft, self.pulses
-        if self.from_file and (
+        if self._from_file and (
             any(misfits(spacecraft, pulses.blocks)) or not keeps_limits(spacecraft, pulses)
         ):
             return False
         return spacecraft.commands is None or bool(pulses.blocks) or not pulses.pulses
 
     @property
-    def held(self) -> tuple[Held, ...]:
+    def _held(self) -> tuple[Held, ...]:
         """Flown residual beside each bound of `requirements`, end and way; empty for an infeasible
         plan.
         """
-        return () if self.left is None else requirements.held(self.spacecraft, self.left)
+        return () if self._left is None else requirements.held(self.spacecraft, self._left)
 
     @property
     def meets_requirement(self) -> bool | None:
@@ -218,29 +233,29 @@ class Plan(results.Data, results.Tabled):
         None without these or a schedule; kept cones alone meet nothing. A momentum shift counts
         from a target axis.
         """
-        return False if self.feasible and self.kept is False else self.ends_well
+        return False if self.feasible and self._kept is False else self._ends_well
 
     @property
-    def ends_well(self) -> bool | None:
+    def _ends_well(self) -> bool | None:
         """Compliance of the flown residual at the end; None where nothing is required."""
         required = [
-            line.met for line in self.held if line.bound.required and line.bound.keep is None
+            line.met for line in self._held if line.bound.required and line.bound.keep is None
         ]
         return all(required) if required else None
 
     @property
-    def shortfalls(self) -> tuple[Bound, ...]:
+    def _shortfalls(self) -> tuple[Bound, ...]:
         """Bounds at the end that the flown residual breaks."""
-        return tuple(line.bound for line in self.held if not line.met and line.bound.keep is None)
+        return tuple(line.bound for line in self._held if not line.met and line.bound.keep is None)
 
     @property
-    def standing(self) -> Standing:
+    def _standing(self) -> Standing:
         """Standing at the end, regardless of cones; an infeasible plan misses all."""
-        if not self.feasible or self.ends_well is False:
+        if not self.feasible or self._ends_well is False:
             return Standing.MISSES
-        if not self.shortfalls:
+        if not self._shortfalls:
             return Standing.COMPLIES
-        return Standing.MISSES if self.ends_well is None else Standing.MEETS
+        return Standing.MISSES if self._ends_well is None else Standing.MEETS
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -249,29 +264,29 @@ class Plan(results.Data, results.Tabled):
         return judgement
 
     @property
-    def severity(self) -> float:
+    def _severity(self) -> float:
         """See `requirements.severity`; infinite for an infeasible plan."""
         return (
             math.inf
-            if self.left is None
-            else float(requirements.severity(self.spacecraft, self.left))
+            if self._left is None
+            else float(requirements.severity(self.spacecraft, self._left))
         )
 
     @property
-    def spin_change(self) -> float | None:
+    def _spin_change(self) -> float | None:
         """ω3 at the end minus at the start, rad/s, flown."""
-        before, after = self.spacecraft.spin, self.flight.settled.spin
+        before, after = self.spacecraft.spin, self._flight.settled.spin
         return float(cleaned([after - before, before])[0]) if self.feasible else None
 
     @cached_property
-    def delta_v(self) -> Vector | None:
+    def _delta_v(self) -> Vector | None:
         """Velocity change in the inertial frame, (3,) m/s; None without mass or where a force is
         not known.
         """
         mass = self.spacecraft.mass
         if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
-        flown = self.flight
+        flown = self._flight
         if self.spacecraft.tank is not None:  # forces accelerate more as the mass falls
             used = 0.0
             pulses = []
@@ -286,7 +301,7 @@ class Plan(results.Data, results.Tabled):
         return end_state.momentum_gained(flown) / mass
 
     @cached_property
-    def aspects(self) -> tuple[Aspect, ...]:
+    def _aspects(self) -> tuple[Aspect, ...]:
         """Extreme angles of the flown spin axis from each watched direction; see
         `cones.aspects`.
         """
@@ -294,13 +309,13 @@ class Plan(results.Data, results.Tabled):
             return ()
         from nutdamp.flight.cones import aspects  # a direction to watch
 
-        return aspects(self.flight)
+        return aspects(self._flight)
 
     @property
-    def kept(self) -> bool | None:
+    def _kept(self) -> bool | None:
         """True if the flown spin axis keeps its cones; None where the file names none."""
         return (
-            all(line.met for line in self.held if line.bound.keep is not None)
+            all(line.met for line in self._held if line.bound.keep is not None)
             if self.spacecraft.keep
             else None
         )
@@ -322,7 +337,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
 
         forbidden = at_target(spacecraft)
         if forbidden is not None:
-            return Plan(spacecraft, scheme, None, astray=forbidden)
+            return Plan(spacecraft, scheme, None, _astray=forbidden)
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     known = as_known(spacecraft, disturbed=chosen.with_disturbances)
     with work.budget(scheme, work.SCHEME) as spent:
@@ -332,8 +347,8 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
             result = judged(spacecraft, scheme, schedule, chosen)
         except Infeasible as reason:
             found_none = isinstance(reason, NotFound)
-            result = Plan(spacecraft, scheme, None, str(reason), found_none=found_none)
-        if result.astray is not None and (
+            result = Plan(spacecraft, scheme, None, str(reason), _found_none=found_none)
+        if result._astray is not None and (
             catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
         ):
             from nutdamp.schemes import routes  # here, because few plans have a cone in the way
@@ -341,7 +356,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
             rerouted = routes.schedules(known, scheme, chosen)
             others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
             result = next((other for other in others if other.feasible), result)
-    return replace(result, options=chosen, cut=spent.exhausted)
+    return replace(result, options=chosen, _cut=spent.exhausted)
 
 
 def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
@@ -386,21 +401,21 @@ def judged(
     left = flown.flown
     breach = next(breaches(spacecraft, schedule), None)
     if breach is not None:
-        return Plan(spacecraft, scheme, None, breach=breach)
+        return Plan(spacecraft, scheme, None, _breach=breach)
     if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
         from nutdamp.flight.cones import broken  # a target
 
-        astray = broken(spacecraft, flown.flight)
+        astray = broken(spacecraft, flown._flight)
         if astray is not None:
-            return Plan(spacecraft, scheme, None, astray=astray)
+            return Plan(spacecraft, scheme, None, _astray=astray)
     if scheme in catalogue.PLANNED and left is not None:
         spin = spacecraft.goal.spin
         least = requirements.decayed(spacecraft, flown.end) * (1.0 - ROUNDING)
-        respun = spin is not None and abs(flown.flight.settled.spin - spin) < abs(
+        respun = spin is not None and abs(flown._flight.settled.spin - spin) < abs(
             spacecraft.spin - spin
         )
         if not respun and left.nutation >= least and left.axis_error >= spacecraft.to_turn:
-            return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
+            return Plan(spacecraft, scheme, None, _worse=left.nutation, _worse_at=flown.end)
     return flown
 
 
@@ -422,7 +437,7 @@ def judge(
     spacecraft = plan.spacecraft
     if not plan.feasible:
         return no_plan(spacecraft, plan.scheme, plan.why or "")
-    flight, observed, held = plan.flight, plan.aspects, plan.held
+    flight, observed, held = plan._flight, plan._aspects, plan._held
     if seen is not None:
         from nutdamp.flight.cones import aspects  # free motion, simulated
 
@@ -437,7 +452,7 @@ def judge(
         results,
         scheme=plan.scheme,
         schedule=plan.pulses,
-        sendable=plan.commandable or timed,
+        sendable=plan._commandable or timed,
         nominal=nominal,
     )
 

@@ -79,12 +79,13 @@ class Cost(NamedTuple):
     nutation: float
 
 
-@dataclass(frozen=True, eq=False)
-class RobustComparison(results.Data):
+@dataclass(frozen=True, eq=False, repr=False)
+class RobustComparison(results.Data, results.Shown):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the
     robust plan.
 
-    ``ground`` decided among the ``equals`` candidates, by propellant or by impulse. ``tightening``:
+    ``ground`` decided among the ``equals`` ``candidates`` of a ``comparison``, by propellant or by
+    impulse; ``probability``: share of the cases that must comply. ``tightening``:
     tolerances with which enough cases would comply, where too few do. ``fresh``: the robust plan in
     cases by which it was not chosen.
     """
@@ -179,7 +180,7 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> Rou
     timed = spacecraft.commands is None or not comparison.only_commanded
     for base in comparison.plans:
         scheme = SCHEMES[base.scheme]
-        if base.failure is not None or not (timed or scheme.reads_commands or not scheme.fires):
+        if base._failure is not None or not (timed or scheme.reads_commands or not scheme.fires):
             continue
         first.append(Variation(partial(list, [(AS_PLANNED, base)])))
         others.append(Variation(partial(_alignments, spacecraft, base.scheme, options)))
@@ -299,7 +300,7 @@ def _entered(comparison: Comparison, plan: Plan, variant: str) -> FlownPlan | No
     if not plan.feasible or not keeps_limits(spacecraft, plan.pulses):
         return None
     own = plan if plan.spacecraft is spacecraft else replace(plan, spacecraft=spacecraft)
-    if comparison.only_commanded and not own.commandable:
+    if comparison.only_commanded and not own._commandable:
         return None
     compared = (comparison.flown or {}).get(plan)
     if compared is not None:
@@ -324,7 +325,7 @@ def _confirmed(
         return None, None, None
 
     def undamped(each: FlownPlan) -> float:
-        return 0.0 if each.plan.standing is Standing.COMPLIES else each.left
+        return 0.0 if each.plan._standing is Standing.COMPLIES else each.left
 
     hopeful = {
         each.plan: each
@@ -378,7 +379,7 @@ def _nearest(
         least = min(candidate.left for candidate in candidates)
         equals = [candidate.plan for candidate in candidates if candidate.left <= AS_GOOD * least]
         best, ground = cheapest(
-            [plan for plan in equals if plan.standing is Standing.COMPLIES] or equals, usual, saved
+            [plan for plan in equals if plan._standing is Standing.COMPLIES] or equals, usual, saved
         )
     elif all(candidate.cases.complying == 0.0 for candidate in candidates):
         equals = [candidate.plan for candidate in candidates]

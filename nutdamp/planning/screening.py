@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common import work
+from nutdamp import units
+from nutdamp.common import results, work
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.inputs import Draws
 from nutdamp.montecarlo.study import (
@@ -39,8 +40,10 @@ from nutdamp.spacecraft.schedule import Schedule
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Dispersion(Dispersed):
-    """Schedule of a ``plan`` flown in dispersed cases."""
+class Dispersion(Dispersed, results.Tabled):
+    """Schedule of a ``plan`` flown in dispersed cases; rows, a case each: number, true inputs,
+    outputs.
+    """
 
     core: Results
     plan: Plan = field(kw_only=True)
@@ -49,6 +52,20 @@ class Dispersion(Dispersed):
     def verdict(self) -> Verdict:
         """Judgement of the plan by these cases."""
         return judge(self.plan, cases_of(self.core), self.core)
+
+    def percentiles(
+        self, levels: float | Iterable[float] = (50, 90, 95, 99, 99.7)
+    ) -> results.Table:
+        """Values of each output that so many percent of the cases do not exceed, a row a level.
+
+        Fields: ``percent``, and the outputs with units in their names, such as ``nutation_deg``.
+        Raises BadRequest.
+        """
+        shares = tuple(levels) if isinstance(levels, Iterable) else (levels,)
+        fits = all(units.is_number(share) and 0.0 <= share <= 100.0 for share in shares)
+        units.expect(fits, "levels", levels, "percentages from 0 to 100, such as (50, 99.7)")
+        table: results.Table = results.view(self, "percentiles", tuple(map(float, shares)))
+        return table
 
 
 def verdict_of(plan: Plan) -> Verdict:

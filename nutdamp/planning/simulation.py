@@ -26,9 +26,6 @@ from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
     from nutdamp.flight.verification import Verification
 
 Array = NDArray[np.float64]
@@ -216,7 +213,7 @@ def unrounded(planned: Plan) -> Schedule | None:
     that planned it.
     """
     spacecraft = planned.spacecraft
-    schemed = planned.scheme in catalogue.SCHEMES and not planned.from_file
+    schemed = planned.scheme in catalogue.SCHEMES and not planned._from_file
     if spacecraft.limits.tick is None or not schemed:
         return None
     return plan(with_limits(spacecraft, tick=None), planned.scheme, planned.options).schedule

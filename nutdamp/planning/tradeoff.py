@@ -117,7 +117,7 @@ def certificate(plan: Plan) -> Certificate:
     if not plan.feasible or known is None or known.first_order is None:
         raise BadRequest(
             f"{OPTIMAL.name} has no least cost to prove here: "
-            f"{plan.refusal or 'there is no such plan'}"
+            f"{plan._refusal or 'there is no such plan'}"
         )
     chosen = planner.settled(OPTIMAL, plan.options, plan.spacecraft)
     modelled = as_known(plan.spacecraft, disturbed=chosen.with_disturbances)
@@ -167,7 +167,7 @@ class Point(NamedTuple):
     @property
     def off(self) -> float:
         """Distance of H from its target at the end, rad."""
-        return self.plan.flight.residual.axis_error
+        return self.plan._flight.residual.axis_error
 
     def serves(self, other: Point) -> bool:
         """True if the schedule costs as little as another one,
@@ -279,7 +279,7 @@ def fronts(
             for each in compared or compare(spacecraft, names, chosen, samples=0)
             if each.scheme in names
             and len(each.pulses)
-            and {bound.part for bound in each.shortfalls} <= ends
+            and {bound.part for bound in each._shortfalls} <= ends
         ]
     plans = [*(plan for _, plan, _ in entries), *others]
     counted = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
@@ -359,8 +359,8 @@ def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trade(results.Data, results.Written):
-    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift
-    allowed.
+    """Time against cost for a ``spacecraft``: ``fronts`` of schedules of the scheme optimal, one
+    for each momentum shift allowed, rad.
 
     ``recommended``: the plan that ``nutdamp plan`` recommends, if any.
     """

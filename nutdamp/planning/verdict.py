@@ -199,8 +199,8 @@ class Cheaper(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Judgement of the ``schedule`` of a ``scheme``, or of a closed loop: its status, and the
-    ``lines`` of all bounds.
+    """Judgement of the ``schedule`` of a ``scheme`` for a ``spacecraft``, or of a closed loop: its
+    ``status``, and the ``lines`` of all bounds.
 
     ``flight``: the judged one, with nominal values, and the ``aspects`` of its axis; ``why`` there
     is no schedule. ``results``: all dispersed cases, None where they were not flown; ``nominal``:

@@ -8,12 +8,12 @@ alone.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeVar
 
-from nutdamp.errors import BadRequest, SenselessOption
-from nutdamp.units import as_given, is_count, is_number
+from nutdamp.errors import BadRequest, SenselessOption, cure_of
+from nutdamp.units import as_given, expect, is_count, is_number
 
 LEAST = (
     "propellant",
@@ -67,7 +67,7 @@ def _option(default: Any, kind: OptionKind, text: str, *, as_is: bool = False) -
 
 @dataclass(frozen=True, kw_only=True)
 class SchemeOptions:
-    """Options of every scheme. Raises SenselessOption for an invalid value."""
+    """Options of every scheme: ``with_disturbances``, ``equal``. Raises SenselessOption."""
 
     equal: ClassVar[bool] = False  # whether the pulses are of one size, which corrections keep
     with_disturbances: bool = _option(
@@ -105,7 +105,7 @@ class SchemeOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoPulseOptions(SchemeOptions):
-    """Options of two-pulse."""
+    """Options of two-pulse; ``literal``: as printed by Magnus."""
 
     literal: bool = _option(
         False, FLAG, "As printed by Magnus: equal halves, small-angle wait.", as_is=True
@@ -118,7 +118,7 @@ DEFAULT_SHARE = 0.125
 
 @dataclass(frozen=True, kw_only=True)
 class FourPulseOptions(SchemeOptions):
-    """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
+    """Of four-pulse: ``on_time`` s, None: min(max_on_time, T_ω/8); ``least``; ``coarse``."""
 
     on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
     least: str = _option(LEAST[0], SAVED, "What to save.")
@@ -155,7 +155,7 @@ class CommandBlockOptions(SchemeOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class RhumbLineOptions(SchemeOptions):
-    """Options of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
+    """Options of rhumb-line: ``on_time`` s (None: an eighth of a spin turn), ``per_turn``."""
 
     equal: ClassVar[bool] = True  # the width is one command
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
@@ -164,7 +164,8 @@ class RhumbLineOptions(SchemeOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalOptions(SchemeOptions):
-    """Options of optimal; ``shift`` rad, how far from its target H may end.
+    """Options of optimal; ``least``: what to save, of `LEAST`; ``shift`` rad, how far from its
+    target H may end.
 
     ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something
     else.
@@ -350,3 +351,34 @@ POINTING = tuple(
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)
+
+
+def expect_names(values: Iterable[str]) -> tuple[str, ...]:
+    """Names of schemes that there are, each once; raises BadRequest."""
+    several = isinstance(values, Iterable) and not isinstance(values, str)
+    expect(several, "names", values, "a list of schemes, such as ['two-pulse']")
+    names = tuple(values)
+    for name in names:
+        if not isinstance(name, str) or name not in NAMES:
+            raise BadRequest(f"there is no scheme {as_given(name)}; {cure_of(name, NAMES)}")
+    return tuple(dict.fromkeys(names))
+
+
+def expect_options(
+    value: Options | SchemeOptions | None, chosen: Mapping[str, Any], scheme: str | None = None
+) -> Options | SchemeOptions | None:
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises
+    BadRequest.
+    """
+    fits = value is None or (isinstance(value, Options | SchemeOptions) and not chosen)
+    expect(fits, "options", value, "nutdamp.Options(…) or keywords")
+    if not chosen:
+        return value
+    options = Options(**chosen)
+    if scheme is not None:
+        own = SCHEMES[scheme].options
+        for unread in options.without_effect([own]):
+            raise BadRequest(
+                f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}"
+            )
+    return options

@@ -390,17 +390,19 @@ body, is looked for: that period is without end where the nutation stands still 
 class Spacecraft(results.Data, results.Shown):
     """Spinning rigid body with its motion at t = 0 and its actuators.
 
-    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None; ``center_of_mass`` (3,) m where
-    the file gives it, in its axes, and its travel with the propellant used, (3,) m/kg in principal
-    axes; ``dissipation`` the time constant in s with which energy dissipation lets the nutation
-    grow or decay, or None; ``nutation_grows`` says which, None: by shape; ``dispersions``: how far
-    true values may differ; ``object_id`` names it in messages, which carry ``orbit``; ``sun`` (3,)
-    is the inertial unit vector to the Sun, where it is known; ``keep`` are cones for the spin axis;
-    ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold; ``cold`` and
-    ``tank`` make pulses weaker than the thrusters say, None where they are not; ``loop`` damps by
-    what a sensor shows; ``built_in``: the built-in example, since no file was named; ``document``
-    are the values of the file, SI, by which `verify` flies on its own; ``source`` is what it was
-    read from, None once a field is replaced.
+    ``name``; ``inertia`` kg m²; ``omega0`` (3,) rad/s in principal axes; ``attitude`` at t = 0, or
+    None; ``mass`` in kg or None; ``channels`` and a ``steerable`` torquer that it fires; ``goal``,
+    ``requirement`` and ``limits``, in rad, s and rad/s; ``disturbances`` N m. ``center_of_mass``
+    (3,) m where the file gives it, in its axes, and ``center_of_mass_per_kg``, its travel with the
+    propellant used, (3,) m/kg in principal axes; ``dissipation`` the time constant in s with which
+    energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says which,
+    None: by shape; ``dispersions``: how far true values may differ; ``object_id`` names it in
+    messages, which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun, where it
+    is known; ``keep`` are cones for the spin axis; ``commands`` is what blocks fired from the Sun
+    pulses of ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than the thrusters
+    say, None where they are not; ``loop`` damps by what a sensor shows; ``built_in``: the built-in
+    example, since no file was named; ``document`` are the values of the file, SI, by which `verify`
+    flies on its own; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str

@@ -453,7 +453,9 @@ def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True, eq=False)
 class CheckedFile(Data):
-    """A valid ``spacecraft`` file, with ``doubts``: warnings on unlikely numbers."""
+    """A valid ``spacecraft`` file, with ``doubts``: warnings on unlikely numbers; ``data``: its entry
+    in JSON.
+    """
 
     spacecraft: Spacecraft
     doubts: tuple[Fault, ...]

@@ -75,7 +75,7 @@ def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
     judged = compared.verdicts[plan]
     data |= {"status": judged.status.value, "meets_requirement": judged.met}
     if plan.spacecraft.commands is not None:
-        data["can_be_commanded"] = plan.commandable if plan.feasible else None
+        data["can_be_commanded"] = plan._commandable if plan.feasible else None
     if judged.lines:
         data["requirement"] = [line_json(line) for line in judged.lines]
     if compared.cases:
@@ -118,18 +118,18 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         **values_of(plan, "scheme", "feasible"),
         "why": infeasibility(plan) or None,
         "meets_requirement": plan.meets_requirement,
-        "requirement": [line_json(line) for line in lines_of(plan.held, None, 1.0)] or None,
+        "requirement": [line_json(line) for line in lines_of(plan._held, None, 1.0)] or None,
         "pulses": commanded(plan.pulses, spacecraft).json(),
         **values_of(schedule, "total_impulse_Nms"),
         "least_impulse_Nms": None if schedule is None else spacecraft.least_impulse,
         **values_of(schedule, "propellant_kg", "end_s"),
-        "delta_v_m_s": None if plan.delta_v is None else cleaned(plan.delta_v).tolist(),
-        "spin_change_rad_s": plan.spin_change,
+        "delta_v_m_s": None if plan._delta_v is None else cleaned(plan._delta_v).tolist(),
+        "spin_change_rad_s": plan._spin_change,
         "residual": residual_json(plan.residual),
         "flown": residual_json(plan.flown),
-        "final": None if schedule is None else final_json(plan.flight),
+        "final": None if schedule is None else final_json(plan._flight),
         "target": target_json(spacecraft),
-        **aspects_json(plan.aspects if plan.feasible else ()),
+        **aspects_json(plan._aspects if plan.feasible else ()),
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
         "notes": [note_json(note) for note in plan_notes(plan)] if plan.feasible else [],
     }

@@ -130,7 +130,7 @@ def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) ->
     if not results.exact:
         right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
         parts.append(Text(right, style="dim"))
-    ends = facts(end_rows(flown.plan.flight, flown.plan.aspects))
+    ends = facts(end_rows(flown.plan._flight, flown.plan._aspects))
     parts += [Text(), Text("Nominal case", style="bold"), ends]
     events = [*cone_lines(results), *emptied]
     if events:

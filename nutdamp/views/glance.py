@@ -100,7 +100,7 @@ def end_facts(plan: Plan) -> Table:
     end = moment(pulses.end) if len(pulses) else "no pulse is needed"
     return facts(
         [
-            *end_rows(plan.flight, plan.aspects),
+            *end_rows(plan._flight, plan._aspects),
             (name, f"{verdicts.spent(pulses)}, pulses: {len(pulses)}"),
             ("last pulse ends", end),
         ]
@@ -245,21 +245,21 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         *residuals,
         *axes,
         *momenta,
-        Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv"),
+        Column("spin_rad_s", "", "", _feasible("_flight.final.spin"), where="csv"),
         Column(
             "",
             "final spin",
             "rad/s",
-            _feasible("flight.settled.spin"),
+            _feasible("_flight.settled.spin"),
             to_figures(6),
             "" if spacecraft.goal.spin is None else "full",
         ),
         Column.named(
-            "spin_change_rad_s",
+            "spin_change_rad_s=_spin_change",
             "spin change",
             "rad/s",
             _four,
-            "full csv page" if any(plan.spin_change for plan in compared.plans) else "full csv",
+            "full csv page" if any(plan._spin_change for plan in compared.plans) else "full csv",
         ),
         Column("delta_v_m_s", "", "", speed, where="csv"),
         *bounds,
@@ -277,7 +277,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
 
 
 def _direction(which: str, angle: Column, plan: Plan) -> Any:
-    return angle.value(getattr(plan.flight.final, which))
+    return angle.value(getattr(plan._flight.final, which))
 
 
 def _why(plan: Plan) -> str:
@@ -287,7 +287,7 @@ def _why(plan: Plan) -> str:
 
 
 def _bound(bound: Bound, plan: Plan) -> str:
-    line = next(line for line in plan.held if line.bound == bound)
+    line = next(line for line in plan._held if line.bound == bound)
     shown = verdicts.value(bound, line.left).removesuffix(" deg")  # the heading has the unit
     return shown if line.met else f"{NOT} {shown}"
 
@@ -306,9 +306,9 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
         ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
         if plan.pulses.blocks:
-            fired = parts.block_table(plan.flight)
+            fired = parts.block_table(plan._flight)
         else:
-            fired = parts.pulse_table(plan.flight, limit=limits(compared.spacecraft)[0])
+            fired = parts.pulse_table(plan._flight, limit=limits(compared.spacecraft)[0])
     schemes = scheme_table(compared, plan).screen("screen", between=" ")
 
     def table(first: int | None = None) -> RenderableType:
@@ -352,7 +352,7 @@ def headline(compared: Comparison) -> Text:
 
 def ends(plan: Plan) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
-    flight, spacecraft = plan.flight, plan.spacecraft
+    flight, spacecraft = plan._flight, plan.spacecraft
     residual = flight.residual
     limit, turn = limits(spacecraft)
     nutation = short_angle(residual.nutation, limit)
@@ -401,7 +401,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         return Group(*lead, *general, *results)
     pulses = chosen.pulses
     if pulses.blocks:
-        results += [Text(), parts.blocks_screen(chosen.flight, chosen.delta_v)]
+        results += [Text(), parts.blocks_screen(chosen._flight, chosen._delta_v)]
     elif len(pulses):
         totals: dict[str, float] = {}
         for pulse in pulses:
@@ -409,7 +409,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         on_times = facts(
             (f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items()
         )
-        results += [Text(), parts.pulse_table(chosen.flight).screen("full"), Text(), on_times]
+        results += [Text(), parts.pulse_table(chosen._flight).screen("full"), Text(), on_times]
     why = joined(reasons(compared))
     warnings = comparison_warnings(compared, tabulated=True)
     beside = [*warnings, *verdict_notes(judged, chosen), *alternatives(compared)]

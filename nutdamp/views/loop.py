@@ -180,7 +180,7 @@ def margin_table(rows: tuple[Margin, ...]) -> DataTable:
 def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     """The screen of ``loop``."""
     run, judged = plan.flown_run, plan.verdict
-    schedule = plan.flight.schedule
+    schedule = plan._flight.schedule
     spent = f"{verdicts.spent(schedule)}, pulses: {len(schedule)}"
     fired = f"{spent}, last ends at {moment(schedule.end)}" if run.fired else "no firing"
     if run.settled is not None:
@@ -216,7 +216,7 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
         "--plot loop.png · nutdamp disperse --loop",
         more=[
             margin_table(plan.margins).screen("screen"),
-            facts(glance.end_rows(plan.flight, plan.aspects)),
+            facts(glance.end_rows(plan._flight, plan._aspects)),
         ],
         verbose=verbose,
     )
@@ -372,8 +372,8 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "dead_band_deg": math.degrees(plan.band.most),
         "pulses": [pulse | firing for pulse, firing in pulses],
         **tables.values_of(plan, "total_impulse_Nms", "propellant_kg", "end_s"),
-        "flown": decisions.residual_json(plan.flight.residual),
-        "final": decisions.final_json(plan.flight),
+        "flown": decisions.residual_json(plan._flight.residual),
+        "final": decisions.final_json(plan._flight),
         "target": decisions.target_json(spacecraft),
         "margins": margin_table(plan.margins).json(),
         "notes": [note_json(entry) for entry in (*faults, *ordered(_notes(plan, plan.verdict)))],

@@ -166,7 +166,7 @@ def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
             share_text,
             "full" if judged else "",
         ),
-        Column("final", "", "", lambda row: final_json(row.plan.flight), where="json"),
+        Column("final", "", "", lambda row: final_json(row.plan._flight), where="json"),
     ]
     return DataTable("Candidates", columns, candidates, robust, mark)
 

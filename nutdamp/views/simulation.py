@@ -118,7 +118,7 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
     pulses = len(simulation.plan.pulses)
     if begun < pulses:
         yield note("track-cut", until_s=extremes.until, begun=begun, pulses=pulses)
-    judged = simulation.plan.flight.residual.nutation
+    judged = simulation.plan._flight.residual.nutation
     if begun == pulses > 0 and abs(simulation.flown.residual.nutation - judged) > TELLING:
         yield note(
             "judged-at-end",
@@ -140,7 +140,7 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     flight, schedule = simulation.shown, simulation.shown.schedule
     if schedule.blocks:
-        yield parts.blocks_screen(flight, simulation.plan.delta_v)
+        yield parts.blocks_screen(flight, simulation.plan._delta_v)
     if len(schedule):
         shown = parts.shown_rows(parts.pulse_table(flight), schedule)
         yield shown.screen("simulate")
@@ -418,7 +418,7 @@ def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
 
 def verification_json(verified: Verified) -> dict[str, Any]:
     """Methods with their differences from the flown motion (rad), conservation, error budget."""
-    flown, verification = verified.plan.flight, verified.core
+    flown, verification = verified.plan._flight, verified.core
     spacecraft = flown.spacecraft
     return {
         **decisions.heading(spacecraft),

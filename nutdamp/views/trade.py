@@ -63,7 +63,7 @@ class TradeRow(NamedTuple):
     @property
     def residual(self) -> Residual:
         """Residual of its flight."""
-        return self.point.plan.flight.residual
+        return self.point.plan._flight.residual
 
     @property
     def bound(self) -> float | None:
@@ -302,7 +302,7 @@ def trade_json(traded: Trade) -> dict[str, Any]:
 
 def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    files = [pulse_table(row.point.plan.flight).csv() for row in rows_of(fronts)]
+    files = [pulse_table(row.point.plan._flight).csv() for row in rows_of(fronts)]
     return list(zip(schedule_paths(folder, len(files)), files, strict=True))
 
 
@@ -336,7 +336,7 @@ def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
     """True where a plan that saves that share of the cost, about none, ends clearly sooner with H
     about as near.
     """
-    shifts = [flown.flight.residual.axis_error for flown in (plan, chosen)]
+    shifts = [flown._flight.residual.axis_error for flown in (plan, chosen)]
     ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 

@@ -295,12 +295,12 @@ def scheme_word(compared: Comparison, plan: Plan) -> str:
     """Verdict on one of the plans compared, or in short why it is not recommended, or why there is
     none.
     """
-    if plan.failure is not None:
-        return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
+    if plan._failure is not None:
+        return f"internal error,\nplease report:\n{type(plan._failure).__name__}"
     if not plan.feasible:
         if SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels:
             return "no thrusters"
-        return "not found" if plan.found_none else "infeasible"
+        return "not found" if plan._found_none else "infeasible"
     why = compared.shortcoming(plan)
     if why is not None:
         return text(why)

@@ -209,9 +209,9 @@ def test_damping(scheme: str, motion: tuple[str, int]) -> None:
         limits={"horizon": "1500 s"},
     )
     ended = Outcome(plan.spacecraft, plan.pulses)
-    assert ended.nutation == pytest.approx(plan.flight.residual.nutation, abs=1e-9)
+    assert ended.nutation == pytest.approx(plan._flight.residual.nutation, abs=1e-9)
     assert ended.nutation < math.radians(0.01)
-    assert ended.shift == pytest.approx(plan.flight.residual.momentum_shift, abs=1e-9)
+    assert ended.shift == pytest.approx(plan._flight.residual.momentum_shift, abs=1e-9)
     if scheme in ("two-pulse", "optimal"):
         assert ended.shift < math.radians(0.02)
     else:
@@ -287,8 +287,8 @@ def test_three_moments_dissipation_and_a_spin_that_changes(scheme: str) -> None:
     }
     plan = planned(scheme, **changes)
     ended = Outcome(plan.spacecraft, plan.pulses)
-    residual = plan.flight.residual
-    assert plan.flight.settled.spin != plan.spacecraft.spin
+    residual = plan._flight.residual
+    assert plan._flight.settled.spin != plan.spacecraft.spin
     # The largest of a nutation that swings between two angles is not that of one moment.
     assert ended.nutation <= residual.nutation + 1e-9
     assert residual.nutation < math.radians(0.05)

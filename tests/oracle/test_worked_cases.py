@@ -41,7 +41,7 @@ def given(path: Path, body: nutdamp.Spacecraft, channel: str, on_time: float) ->
 
 def speed(plan: nutdamp.Plan) -> float:
     """|ΔV|, m/s."""
-    return float(np.linalg.norm(present(plan.delta_v)))
+    return float(np.linalg.norm(present(plan._delta_v)))
 
 
 def used(plan: nutdamp.Plan) -> float:
@@ -111,7 +111,7 @@ def test_lunar_prospector_trims_its_spin_less_than_a_valve_without_delay_would(
 ) -> None:
     """Report 79: 0.155 rpm in 0.63 s. C is that of 0.7 s for 0.2 rpm (report 30), tanks fuller."""
     plan = given(tmp_path / "trim.csv", prospector(channels={"T1": ["T1"]}), "T1", 0.63)
-    change = (plan.spacecraft.spin - plan.flight.final.spin) / RPM
+    change = (plan.spacecraft.spin - plan._flight.final.spin) / RPM
     assert change / 0.155 == pytest.approx(1.16, abs=0.01)
     assert used(plan) == pytest.approx(0.003, abs=0.0015)
 

@@ -73,7 +73,7 @@ def check(
     with within(most):
         plan = planning.plan(body, scheme, options)
         left, residual = plan.flown, plan.residual
-        figures = (left, residual, plan.delta_v, plan.spin_change, plan.meets_requirement)
+        figures = (left, residual, plan._delta_v, plan._spin_change, plan.meets_requirement)
     assert plan.feasible == (infeasibility(plan) == "")
     if not plan.feasible:
         assert (len(plan.pulses), figures) == (0, (None,) * 5)
@@ -85,7 +85,7 @@ def check(
         assert np.isfinite(
             [angles.nutation, angles.body_cone, angles.space_cone, angles.momentum_shift]
         ).all()
-    if body.inertia.symmetric and not body.disturbances and plan.spin_change is not None:
+    if body.inertia.symmetric and not body.disturbances and plan._spin_change is not None:
         # After a long wait the clock tells the width of a pulse to its own rounding only.
         slips = [
             abs(one.impulse[2]) * 4 * np.spacing(one.end) / one.on_time
@@ -94,13 +94,15 @@ def check(
         ]
         change = math.fsum(one.impulse[2] for one in plan.pulses)
         rounding = 1e-9 * abs(body.spin) * body.inertia.C
-        assert plan.spin_change * body.inertia.C == pytest.approx(change, abs=rounding + sum(slips))
+        assert plan._spin_change * body.inertia.C == pytest.approx(
+            change, abs=rounding + sum(slips)
+        )
     if body.goal.axis is None:
         # Where ω stands still in the body, each of two channels beside it fires a pair.
         pairs = {2} if body.nutation_rate != 0.0 else {2, 4}
         assert len(plan.pulses) in pairs if scheme == "two-pulse" else len(plan.pulses) > 0
         assert left.nutation < body.nutation
-        assert plan.spin_change is not None
+        assert plan._spin_change is not None
         return plan
     requested = body.nutation + body.to_turn
     assert left.nutation < body.nutation or left.axis_error < body.to_turn or requested < 1e-12
@@ -513,7 +515,7 @@ def standing(number: int, compared: Comparison) -> Standing | None:
     body = compared.spacecraft
     chosen = compared.recommended
     warnings = [*comparison_warnings(compared)]
-    assert not compared.failed, (number, [one.failure for one in compared.failed])
+    assert not compared.failed, (number, [one._failure for one in compared.failed])
     feasible = tuple(one for one in compared.plans if one.flown is not None)
     if chosen is None or chosen.flown is None:
         assert not feasible
@@ -530,11 +532,11 @@ def standing(number: int, compared: Comparison) -> Standing | None:
     assert compared.verdict.idle == complies(body, body.nutation, aim), number
     if good:
         assert cost(chosen, tuple(good)) <= 1.001 * min(cost(one, tuple(good)) for one in good)
-        return chosen.standing
+        return chosen._standing
     counts = (
         1 if body.goal.axis is None else 2
     )  # the nutation, or the distance from a target where that is more
-    alike = [max(left(one)[:counts]) for one in feasible if one.standing is chosen.standing]
+    alike = [max(left(one)[:counts]) for one in feasible if one._standing is chosen._standing]
     assert max(left(chosen)[:counts]) <= min(alike) + math.radians(1e-3), number
     missed = [
         entry.values for entry in warnings if entry.code in ("requirement-missed", "not-damped")
@@ -545,7 +547,7 @@ def standing(number: int, compared: Comparison) -> Standing | None:
         assert values["left_deg"] == pytest.approx(left_deg), number
     untried = body.channels and all(one.scheme != "optimal" for one in compared.plans)
     assert ("optimal-not-compared" in codes(warnings)) == bool(untried), number
-    return chosen.standing
+    return chosen._standing
 
 
 @pytest.mark.weekly
@@ -569,7 +571,7 @@ def test_nothing_beats_what_is_recommended_and_what_is_said_of_it_is_so() -> Non
             )
             for off in (1e-8, -1e-8)
         )
-        assert surely <= (chosen.standing is Standing.COMPLIES) <= hardly
+        assert surely <= (chosen._standing is Standing.COMPLIES) <= hardly
     assert flown > 20
     # Each kind of outcome is there, and often.
     assert min(standings.count(Standing.COMPLIES), standings.count(Standing.MISSES)) > COUNT // 5
@@ -676,7 +678,7 @@ def test_of_the_plans_that_meet_the_one_that_takes_least_is_recommended(
     meeting = [
         plan
         for plan, each in flown.items()
-        if plan.flown and each.cases.low >= 0.997 and plan.ends_well
+        if plan.flown and each.cases.low >= 0.997 and plan._ends_well
     ]
     assert (compared.verdict.status is Status.FLY) is bool(meeting)
     if meeting:

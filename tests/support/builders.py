@@ -203,7 +203,7 @@ class Judged(Plan):
         return self.ended
 
     @property
-    def left(self) -> Left | None:
+    def _left(self) -> Left | None:
         spin = self.spacecraft.spin if self.ended_spin is None else self.ended_spin
         return (
             None if self.ended is None else Left(self.ended.nutation, self.ended.axis_error, spin)

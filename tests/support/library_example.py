@@ -1,5 +1,7 @@
 """The example of the guide."""
 
+import numpy
+
 import nutdamp
 
 spacecraft = nutdamp.load("spacecraft.yaml")
@@ -8,7 +10,7 @@ flight = plan.fly()
 flight.to_csv("track.csv")
 
 track = flight.to_numpy()  # fields are named as the columns of the CSV
-print(plan.to_numpy()[["start_s", "on_time_s", "channel"]])
+print(numpy.asarray(plan)[["start_s", "on_time_s", "channel"]])
 print(
     f"at most {track['nutation_deg'].max():.3f} deg, at the end {track['nutation_deg'][-1]:.1e} deg"
 )

@@ -399,7 +399,7 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[Message
                 used = f"the propellant of pulse {place} ({pulse.channel})"
                 raise BadRequest(f"{used} is not known, which an OPM needs; give the thrusters isp")
             assert plan.spacecraft.mass is not None
-            gained = momentum_gained(replace(plan.flight, schedule=Schedule((pulse,))))  # inertial
+            gained = momentum_gained(replace(plan._flight, schedule=Schedule((pulse,))))  # inertial
             values = [
                 *timing,
                 mass,

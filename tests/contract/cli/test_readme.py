@@ -113,7 +113,7 @@ def test_every_snippet_of_python_is_an_example_that_runs() -> None:
         for text in TEXTS.values()
         for code in re.findall(r"```python\n(.+?)```", text, re.DOTALL)
     ]
-    examples = ("library_example.py", "library_sweep.py")
+    examples = ("library_example.py", "library_dispersion.py", "library_sweep.py")
     for name, code in zip(examples, snippets, strict=True):
         assert (places.TESTS / "support" / name).read_text(encoding="utf-8").endswith(code)
 

@@ -69,7 +69,7 @@ def read(write: Write) -> Read:
 @pytest.fixture
 def written() -> str:
     """The four pulses of the example as `plan --csv` writes them."""
-    return pulse_table(planning.plan(EXAMPLE, "four-pulse").flight).csv()
+    return pulse_table(planning.plan(EXAMPLE, "four-pulse")._flight).csv()
 
 
 def test_a_longer_on_time_is_what_the_thruster_then_does(read: Read, written: str) -> None:
@@ -121,7 +121,7 @@ def test_the_centre_of_a_pulse_from_a_falling_tank_is_read_as_it_was_written(rea
     body = replace(EXAMPLE, tank=Tank(0.03, 22e5, 8e5, 1.0))
     plan = planning.plan(body, "four-pulse")
     assert all(pulse.t < pulse.loaded[0] + 0.4999 * pulse.loaded[1] for pulse in plan.pulses)
-    again, warnings = read(pulse_table(plan.flight).csv(), body)
+    again, warnings = read(pulse_table(plan._flight).csv(), body)
     assert warnings == []
     assert [pulse.t for pulse in again] == pytest.approx(
         [pulse.t for pulse in plan.pulses], rel=1e-12

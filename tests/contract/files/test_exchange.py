@@ -209,7 +209,7 @@ def test_velocity_changes_are_those_of_each_pulse(name: str) -> None:
             -present(pulse.propellant), rel=1e-15
         )
         total += velocity
-    assert total == pytest.approx(present(plan.delta_v), rel=1e-9, abs=1e-15)
+    assert total == pytest.approx(present(plan._delta_v), rel=1e-9, abs=1e-15)
 
 
 def test_without_an_orbit_only_the_manoeuvres_are_written() -> None:

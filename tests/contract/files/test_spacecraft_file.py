@@ -625,7 +625,7 @@ def test_velocity_grows_as_the_mass_falls() -> None:
         "sat.yaml",
     )
     fired = tuple(channel_pulse(body.channels[0], 0.2 + 0.4 * number, 0.4) for number in range(100))
-    gained = planning.Plan(body, "file", Schedule(supplied(body, fired))).delta_v
+    gained = planning.Plan(body, "file", Schedule(supplied(body, fired)))._delta_v
     used = math.fsum(pulse.propellant or 0.0 for pulse in fired)
     rocket = 200.0 * 9.80665 * math.log(10.0 / (10.0 - used))
     assert float(np.linalg.norm(present(gained))) == pytest.approx(rocket, rel=1e-4)
@@ -636,7 +636,7 @@ def test_csv_has_commands_and_effective_times_and_is_read_back(tmp_path: Path) -
     body = read_lines(VALVE, COLD)
     plan = planning.plan(body, "one-pulse")
     path = tmp_path / "pulses.csv"
-    path.write_text(pulse_table(plan.flight).csv(), encoding="utf-8")
+    path.write_text(pulse_table(plan._flight).csv(), encoding="utf-8")
     again, warnings = read_pulses(path, body)
     assert warnings == []
     assert path.read_text().splitlines()[0].endswith(",".join(EFFECTIVE))

@@ -4,6 +4,7 @@ studies.
 
 import csv
 import doctest
+import inspect
 import io
 import json
 import math
@@ -14,15 +15,19 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from datetime import date, datetime, timedelta, timezone
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 from support import places
 from support.builders import present
+from support.cases import spread
 from support.golden import check_text, refusal, refused
 from support.process import Run
 from support.shown import parsed
@@ -33,8 +38,9 @@ from nutdamp.figures import style
 from nutdamp.files import schedules, tabular
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import propagation
+from nutdamp.montecarlo import study
 from nutdamp.montecarlo.inputs import list_inputs
-from nutdamp.page import report
+from nutdamp.page import report, results
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import plan
 
@@ -55,6 +61,8 @@ KEYS: dict[str, Any] = {
     "limits": {"horizon": "100 s", "max_pulses": np.int64(3)},
 }
 
+
+IN_SKY = {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -85,6 +93,43 @@ def test_every_public_name_is_there_and_no_other() -> None:
         _ = nutdamp.nonsense  # type: ignore[attr-defined]
 
 
+CLASSES = [
+    pytest.param(value, id=name)
+    for name in nutdamp.__all__
+    if isinstance(value := getattr(nutdamp, name), type)
+]
+
+UNIT = re.compile(
+    r"\b(rad|s|kg|m|N|Hz)\b|%|share|ratio|number|factor|unit vector|sign\b", re.IGNORECASE
+)
+"""Units, and words for numbers without one."""
+
+ANGLE = re.compile(r"nutation$|cone$|shift$|axis_error|tilt$|angle$|azimuth|^largest$")
+"""Names of angles: their docstrings say that they are in rad."""
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+def test_every_public_attribute_is_documented_with_its_unit(kind: type) -> None:
+    """Fields in the docstrings of their class and its bases, others in their own."""
+    bases = [base for base in kind.__mro__ if base.__module__.startswith("nutdamp")]
+    about = " ".join(inspect.getdoc(base) or "" for base in bases)
+    fields = {name: text for base in bases for name, text in inspect.get_annotations(base).items()}
+    attributes = {name for name in dir(kind) if not hasattr(Exception(), name)} | {*fields}
+    for name in (name for name in sorted(attributes) if name[0] != "_"):
+        member: Any = inspect.getattr_static(kind, name, None)
+        getter = getattr(member, "fget", None) or getattr(member, "func", None)
+        own = (getter or member).__doc__ if getter or inspect.isroutine(member) else ""
+        if name in fields and getter is None:
+            assert re.search(rf"\b{name}\b", about), name
+            value, text = str(fields[name]), about
+        else:
+            assert own, name
+            value, text = str(getattr(getter, "__annotations__", {}).get("return")), own
+        if re.search(r"\b(float|Vector|Array)\b", value):
+            assert UNIT.search(text), name
+            assert not ANGLE.search(name) or "rad" in text, name
+
+
 @pytest.mark.weekly
 def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
     lines = [
@@ -105,11 +150,13 @@ def test_a_type_checker_knows_what_comes_back(tmp_path: Path) -> None:
 @pytest.mark.deep
 def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
     run("init")
-    example, sweep = (
+    example, dispersion, sweep = (
         python(tmp_path, str(places.TESTS / "support" / f"library_{name}.py"))
-        for name in ("example", "sweep")
+        for name in ("example", "dispersion", "sweep")
     )
-    assert example.returncode == sweep.returncode == 0, example.stderr + sweep.stderr
+    for ran in (example, dispersion, sweep):
+        assert ran.returncode == 0, ran.stderr
+    assert re.match(r"\[0\.\d+ 0\.\d+\]\n0\.0\d+\n", dispersion.stdout)
     assert "<Plan two-pulse: 2 pulses until 7.434 s" in example.stdout
     assert (tmp_path / "track.csv").stat().st_size > 100_000
     lines = []
@@ -166,6 +213,67 @@ def test_a_plan_is_of_the_scheme_named_or_the_recommended_one() -> None:
     assert by_keyword.pulses[0].on_time == 0.2
 
 
+@pytest.mark.parametrize(
+    ("words", "goal"),
+    [
+        ("--target 10deg,45deg", {"target": "10deg,45deg"}),
+        ("--target 10deg,45deg", {"target": ("10 deg", math.radians(45.0))}),
+        ("--target 0.1745,1", {"target": np.array([0.1745, 1.0])}),
+        ("--spin 31.5rpm", {"spin": "31.5 rpm"}),
+        ("--spin 3.5", {"spin": np.float64(3.5)}),
+        ("--spin keep --target 0.2,0", {"spin": "keep", "target": (0.2, 0)}),
+    ],
+)
+def test_a_goal_is_given_as_on_the_command_line(run: Run, words: str, goal: dict[str, Any]) -> None:
+    shown = run(*f"plan -q --nominal --scheme two-pulse {words} --json -".split(), status=None)
+    compared = nutdamp.compare(CRAFT, ["two-pulse"], samples=0, **goal)
+    assert written(compared.to_dict()) == json.loads(shown.stdout)
+    (plan,) = compared
+    assert nutdamp.plan(CRAFT, "two-pulse", **goal).to_dict() == plan.to_dict()
+
+
+def test_a_goal_beside_the_file_is_doubted_and_refused_by_its_name() -> None:
+    calls: list[dict[str, Any]] = [
+        {"target": "10deg"},
+        {"target": "10,5deg,45deg"},
+        {"target": (1.0, 2.0, 3.0)},
+        {"target": 0.2},
+        {"target": ("200 deg", 0)},
+        {"target": ("1 s", 0)},
+        {"spin": "0rpm"},
+        {"spin": "fast"},
+        {"spin": -3},
+        {"spin": [3]},
+    ]
+    messages = [refusal(errors.BadRequest, LIB.plan, CRAFT, "none", **goal) for goal in calls]
+    check_text("library.goals-refused", "\n".join(messages))
+    with pytest.warns(UserWarning, match="^spin: 30 is read as 30 rad/s"):
+        nutdamp.plan(CRAFT, "none", spin="30")
+    with pytest.warns(UserWarning, match=r"^target: 10 is read as 10 rad \(573 deg\)"):
+        nutdamp.plan(CRAFT.with_(attitude=IN_SKY), "none", target="10,0")
+
+
+def test_a_plan_to_a_goal_beside_the_file_is_carried_on() -> None:
+    """With the goal of the file, as by ``-o``."""
+    plan = nutdamp.plan(CRAFT, "half-cone", target="10deg,45deg")
+    later = plan.carried()
+    assert later.goal.axis is None
+    assert nutdamp.plan(later, "none", target="10deg,45deg").spacecraft.goal.axis is not None
+
+
+@pytest.mark.deep
+def test_a_robust_plan_needs_no_comparison() -> None:
+    body = CALM.with_(
+        omega0=[0.1, 0, 3],
+        steerable={"torque": "40 N m"},
+        requirement={"nutation": "0.5 deg"},
+        dispersions={"thrust": {"normal": "5 %"}},
+    )
+    own, compared = nutdamp.robust(body), nutdamp.robust(nutdamp.compare(body, robust=False))
+    assert own.to_dict() == compared.to_dict()
+    assert own.verdict.met
+
+
 def test_there_is_one_type_of_each_name() -> None:
     """What the library gives is what the modules below make, not something around it."""
     compared = nutdamp.compare(CRAFT, ["two-pulse"], samples=0)
@@ -191,7 +299,7 @@ def test_every_residual_carries_the_name_of_its_model() -> None:
 
 def test_numbers_of_numpy_are_numbers() -> None:
     plan = nutdamp.plan(CRAFT, "four-pulse", Options(on_time=np.float64(0.5), per_turn=np.int64(2)))
-    assert max(plan.to_numpy()["on_time_s"]) == 0.5
+    assert max(np.asarray(plan)["on_time_s"]) == 0.5
     assert len(plan.fly(until=np.float64(3.0), samples=np.int64(5)).track.t) >= 5  # type: ignore[arg-type]
 
 
@@ -203,6 +311,53 @@ def test_a_dict_is_read_as_the_file_is() -> None:
     assert nutdamp.example("ace").name == "ACE"
     with refused(errors.FaultyFile, "library.faulty-dict"):
         nutdamp.load({"nam": "X", "inertia": {"A": "120 s", "C": 80}, "omega0": [0, 0, 3]})
+
+
+@spread("path", sorted(places.CONFIGS.glob("*.yaml")), quick=6, deep=13)
+def test_what_yaml_makes_of_a_file_is_read_as_the_file(path: Path) -> None:
+    """Moments and numbers such as 42e-3, too."""
+    text = path.read_text(encoding="utf-8")
+    assert nutdamp.load(yaml.safe_load(text)).to_dict() == nutdamp.read(text).to_dict()
+
+
+@pytest.mark.parametrize(
+    ("moment", "epoch"),
+    [
+        (datetime(2026, 3, 1, 12, 0), "2026-03-01T12:00:00"),
+        (
+            datetime(2026, 3, 1, 13, 30, 0, 500, timezone(timedelta(hours=1.5))),
+            "2026-03-01T12:00:00.0005Z",
+        ),
+    ],
+)
+def test_moments_of_python_are_epochs_in_utc(moment: datetime, epoch: str) -> None:
+    timed, written = (
+        {"quaternion": [1, 0, 0, 0], "epoch": at, "frame": "EME2000"} for at in (moment, epoch)
+    )
+    expected = CRAFT.with_(attitude=written).utc(10.0)
+    assert nutdamp.load({**KEYS, "attitude": timed}).utc(10.0) == expected
+    assert CRAFT.with_(attitude=timed).utc(10.0) == expected
+    assert nutdamp.load(KEYS, set={"attitude": timed}).utc(10.0) == expected
+    assert nutdamp.load({**KEYS, "name": moment.date()}).name == "2026-03-01"
+
+
+def test_each_refusal_of_a_value_names_its_key() -> None:
+    nested: list[object] = []
+    nested.append(nested)
+    messages = [
+        refusal(nutdamp.NutdampError, call)
+        for call in [
+            lambda: LIB.load({**KEYS, "mass": object()}),
+            lambda: LIB.load({**KEYS, "thrusters": [{"name": "T1", "force": 1 + 2j}]}),
+            lambda: LIB.load({**KEYS, "limits": {"blackout": nested}}),
+            lambda: LIB.load({**KEYS, "attitude": {"epoch": date(2026, 3, 1)}}),
+            lambda: LIB.load(KEYS, set={"mass": 1j}),
+            lambda: LIB.load(KEYS, set={"limits.blackout": [[1, object()]]}),
+            lambda: CRAFT.with_(limits={"blackout": [[1, ...]]}),
+            lambda: LIB.load({**KEYS, "mass": "5"}),
+        ]
+    ]
+    check_text("library.keys-named", "\n".join(messages))
 
 
 def test_with_changes_the_keys_named_and_no_others(tmp_path: Path) -> None:
@@ -295,6 +450,7 @@ def test_a_wrong_argument_is_reported_with_what_was_expected() -> None:
             lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=1.0), on_time=0.2),
             lambda: LIB.simulate(planned(), -1.0),
             lambda: LIB.robust(planned()),
+            lambda: LIB.robust(CALM),
             lambda: LIB.loop(CRAFT),
             lambda: LIB.loop(nutdamp.example("upper-stage"), case=0),
             lambda: LIB.report(planned()),
@@ -329,7 +485,7 @@ def test_what_cannot_be_says_so_in_an_error_of_the_package(tmp_path: Path) -> No
         nutdamp.read("name: X\ninertia: {A: 120, C: 80}\nomega0: [0.1, 0, 3]\n"), "four-pulse"
     )
     assert not infeasible.feasible
-    assert len(infeasible.to_numpy()) == len(infeasible) == 0
+    assert len(np.asarray(infeasible)) == len(infeasible) == 0
     calls: list[tuple[type[Exception], Call]] = [
         (errors.CannotRead, lambda: nutdamp.load(tmp_path / "missing.yaml")),
         (errors.FaultyFile, lambda: nutdamp.read("name: X\n")),
@@ -465,24 +621,118 @@ def test_arrays_and_data_frames_have_the_columns_of_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = nutdamp.plan(nutdamp.read(TILTED), "two-pulse")
-    pandas = types.ModuleType("pandas")
-    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    made: Any
     for made, header in ((plan, schedules.PULSES_HEADER), (plan.fly(samples=50), tabular.HEADER)):
-        array = made.to_numpy()
+        array = np.asarray(made)
         assert array.dtype.names == header
         made.to_csv(tmp_path / "rows.csv")
         rows = list(csv.reader(io.StringIO((tmp_path / "rows.csv").read_text())))[1:]
         for mine, row in zip(array.tolist(), rows, strict=True):
             assert [str(cell) for cell in mine] == [cell or "nan" for cell in row]
-        monkeypatch.setitem(sys.modules, "pandas", pandas)
-        frame = made.to_pandas()
-        assert tuple(frame) == header
-        assert all(np.array_equal(frame[name], array[name]) for name in header)
-        monkeypatch.setitem(sys.modules, "pandas", None)
-        with refused(nutdamp.NutdampError, "library.no-pandas"):
-            made.to_pandas()
-        with pytest.raises(ImportError):
-            made.to_pandas()
+    pandas = types.ModuleType("pandas")
+    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    flight = plan.fly(samples=50)
+    array, frame = flight.to_numpy(), flight.to_pandas()
+    assert tuple(frame) == array.dtype.names
+    assert all(np.array_equal(frame[name], array[name]) for name in frame)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with refused(nutdamp.NutdampError, "library.no-pandas"):
+        flight.to_pandas()
+    with pytest.raises(ImportError):
+        flight.to_pandas()
+
+
+PUBLIC = """
+spacecraft scheme schedule pulses options feasible why verdict notes meets_requirement propellant
+total_impulse end residual flown fly simulate carried to_dict to_csv figure
+"""
+
+
+def test_a_plan_has_few_names_and_the_former_ones_warn(monkeypatch: pytest.MonkeyPatch) -> None:
+    pandas = types.ModuleType("pandas")
+    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    plan = planned()
+    assert [name for name in dir(plan) if name[0] != "_"] == sorted(PUBLIC.split())
+    for name, cure in results.FORMER.items():
+        with pytest.warns(DeprecationWarning, match=f"^{name} of a plan goes .*{re.escape(cure)}"):
+            former = getattr(plan, name)
+        own = getattr(plan, "notes" if name == "remarks" else f"_{name}")
+        assert former is own or repr(former) == repr(own), name
+    with pytest.warns(DeprecationWarning, match="to_numpy") as warned:
+        assert np.array_equal(plan.to_numpy(), np.asarray(plan))
+    assert warned[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match="to_pandas"):
+        assert tuple(plan.to_pandas()) == np.asarray(plan).dtype.names
+    with pytest.raises(AttributeError, match="'Plan' object has no attribute 'flights'"):
+        _ = plan.flights
+    assert (
+        plan.simulate(20.0, flown=True).to_dict()
+        == nutdamp.simulate(plan, 20.0, flown=True).to_dict()
+    )
+
+
+SCATTERED: dict[str, Any] = {
+    "dispersions": {"omega0": {"normal": "0.05 deg/s"}, "thrust": {"normal": "5 %"}},
+    "attitude": IN_SKY,
+    "sun": [0.0, 0.0],
+    "keep": [{"name": "Sun", "direction": "sun", "min": "1 deg"}],
+}
+
+
+@pytest.mark.parametrize("spin", [None, "keep"])
+def test_dispersed_cases_are_rows_of_their_file(
+    spin: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = nutdamp.plan(CRAFT.with_(**SCATTERED), "two-pulse", spin=spin)
+    flown = nutdamp.disperse(plan, 50, seed=3, csv=tmp_path / "own.csv")
+    cases = flown.to_numpy()
+    header, *rows = csv.reader(io.StringIO((tmp_path / "own.csv").read_text()))
+    assert cases.dtype.names == tuple(header)
+    assert cases["case"].tolist() == [*range(1, 51)]
+    assert [[str(cell) for cell in case] for case in cases.tolist()] == rows
+    assert ("spin_error_rad_s" in header, "Sun_least_deg" in header) == (spin is not None, True)
+    flown.to_csv(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "own.csv").read_bytes()
+    pandas = types.ModuleType("pandas")
+    pandas.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    assert tuple(flown.to_pandas()) == tuple(header)
+
+
+def test_percentiles_are_those_of_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = nutdamp.plan(CRAFT.with_(**SCATTERED), "two-pulse")
+    flown = nutdamp.disperse(plan, 3_000)
+    cases = flown.to_numpy()
+    levels = flown.percentiles([0, 2.5, 50, 100])
+    names = present(cases.dtype.names)
+    assert levels.dtype.names == ("percent", *names[names.index("nutation_deg") :])
+    for name in names[names.index("nutation_deg") :]:
+        assert levels[name] == pytest.approx(np.percentile(cases[name], levels["percent"]))
+    usual, shown = flown.percentiles(), flown.to_dict()["percentiles"]["propellant_kg"]
+    assert usual["propellant_kg"].tolist() == [shown[f"{level:g}"] for level in usual["percent"]]
+    assert flown.percentiles(50).tolist() == flown.percentiles([50]).tolist()
+    refusals = [
+        refusal(errors.BadRequest, flown.percentiles, wrong)
+        for wrong in (101, [-1], "50", [None], math.nan)
+    ]
+    check_text("library.levels", "\n".join(refusals))
+    monkeypatch.setattr(study, "EXACT_CASES", 2_000)  # beyond it cases are counted
+    counted = nutdamp.disperse(plan, 3_000)
+    for name in present(levels.dtype.names):
+        assert counted.percentiles(levels["percent"])[name] == pytest.approx(levels[name], rel=3e-3)
+    for refusing in (counted.to_numpy, partial(counted.to_csv, "cases.csv")):
+        with refused(errors.BadRequest, "library.cases-counted"):
+            refusing()
+
+
+def test_percentiles_of_what_is_not_known_are_none() -> None:
+    """An ideal torquer has no propellant."""
+    body = CALM.with_(omega0=[0.1, 0, 3], dispersions={"omega0": {"normal": "0.05 deg/s"}})
+    flown = nutdamp.disperse(nutdamp.plan(body, "two-pulse"), 50)
+    assert np.isnan(flown.percentiles()["propellant_kg"]).all()
+    assert np.isfinite(flown.percentiles()["nutation_deg"]).all()
 
 
 def test_the_track_is_in_the_axes_of_the_file() -> None:
@@ -737,21 +987,37 @@ class Tags(HTMLParser):
 
 
 @pytest.mark.deep
-def test_notebooks_show_small_tables() -> None:
+def test_notebooks_show_a_headline_bounds_a_table_and_a_picture() -> None:
     craft = nutdamp.read(TILTED.replace("Tilted", "'<b>&\"'"))
+    scattered = CALM.with_(
+        omega0=[0.1, 0, 3],
+        steerable={"torque": "40 N m"},
+        requirement={"nutation": "0.5 deg"},
+        dispersions={"thrust": {"normal": "1 %"}},
+    )
     compared = nutdamp.compare(craft)
     plan = compared["two-pulse"]
-    for shown in (craft, compared, plan, plan.fly(), nutdamp.plan(craft, "four-pulse")):
+    dispersed = nutdamp.disperse(nutdamp.plan(scattered, "two-pulse"), 2_100)
+    rows: list[tuple[Any, str, int, bool]] = [
+        (craft, "", 1, False),
+        (plan.fly(), "", 1, True),
+        (plan.simulate(9.0), "", 1, True),
+        (plan, "FLY two-pulse: pulses 2", 2, True),
+        (compared, "FLY", 2, True),
+        (nutdamp.plan(craft, "four-pulse"), "NO PLAN: ", 0, False),
+        (nutdamp.loop(nutdamp.example("upper-stage"), 60.0), "ENOUGH: met", 2, True),
+        (dispersed, "FLY two-pulse: pulses 2", 2, True),
+        (nutdamp.robust(scattered), "FLY", 2, True),
+    ]
+    for shown, headline, tables, drawn in rows:
         tags = Tags()
         text = present(shown._repr_html_())
         tags.feed(text)
         assert tags.open == []
-        assert "table" in tags.seen or "infeasible" in text
-        assert ("svg" in tags.seen) == (
-            shown is not craft and "infeasible" not in text
-        )  # the motion beside the table
+        assert headline in text, shown
+        assert (text.count("<table"), "svg" in tags.seen) == (tables, drawn), shown
         assert "b" not in tags.seen
-        assert repr(shown).startswith(f"<{type(shown).__name__}")
+        assert re.fullmatch(r"<\w+ .*>|<\w+: .*>", repr(shown))
 
 
 def test_notebooks_show_less_without_matplotlib_and_jinja(monkeypatch: pytest.MonkeyPatch) -> None:

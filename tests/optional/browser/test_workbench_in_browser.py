@@ -227,7 +227,7 @@ def test_a_changed_motion_is_drawn_as_it_is_flown(browse: Browse, written: Any, 
 
 def test_the_spin_has_its_limit_too(browse: Browse, paged: Callable[[Moving], Path]) -> None:
     plan = chosen(FILES["single-thruster"])  # its pulses change the spin
-    spin = 1.002 * plan.flight.settled.spin
+    spin = 1.002 * plan._flight.settled.spin
     body = replace(plan.spacecraft, goal=Goal(spin=spin))
     with browse(paged(moving_of(replace(plan, spacecraft=body)))) as page:
         expect(page, propagation.flown(body, plan.pulses))

@@ -95,19 +95,19 @@ def test_a_search_that_is_cut_ends_soon_with_what_it_has(
     monkeypatch.setattr(work, "SCHEME", most)
     with work.budget("test", 1e9) as spent:
         plan = planning.plan(body, "optimal")
-    assert plan.cut
+    assert plan._cut
     assert spent.done < most + 300.0
     assert "search-ended" in codes(plan_notes(plan)) or CUT in infeasibility(plan)
     monkeypatch.setattr(work, "COMMAND", 30.0)
     with work.budget("test", 1e9) as spent:
         compared = compare(body, ("one-pulse", "optimal"))
-    assert compared.plans[-1].cut
+    assert compared.plans[-1]._cut
     for other in (
         compared,
         compare(replace(body, goal=Goal(), requirement=None), ("one-pulse", "optimal")),
     ):
         missed = other.recommendation.standing is not planning.Standing.COMPLIES
-        assert (missed, other.plans[-1].cut) == (other is compared, True)
+        assert (missed, other.plans[-1]._cut) == (other is compared, True)
         assert ("search-incomplete" in codes(comparison_warnings(other))) is missed
     assert spent.done < 330.0
 
@@ -117,7 +117,7 @@ def test_what_is_not_cut_is_the_same_with_any_budget(monkeypatch: pytest.MonkeyP
     before = planning.plan(body, "optimal")
     monkeypatch.setattr(work, "SCHEME", 1e9)
     after = planning.plan(body, "optimal")
-    assert (before.cut, before.feasible) == (False, True)
+    assert (before._cut, before.feasible) == (False, True)
     assert [(one.t, one.on_time) for one in before.pulses] == [
         (one.t, one.on_time) for one in after.pulses
     ]
@@ -138,7 +138,7 @@ def test_damping_of_thousands_of_turns_before_a_turn_of_the_axis_is_cut_too(
     monkeypatch.setattr(work, "SCHEME", 300.0)
     with work.budget("test", 1e9) as spent:
         plan = planning.plan(aimed(body, 40.0, 10.0), scheme)
-    assert (plan.cut, plan.feasible) == (True, False)
+    assert (plan._cut, plan.feasible) == (True, False)
     assert spent.done < 1500.0  # of 39,000 without a bound
 
 
@@ -179,7 +179,7 @@ def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) ->
         return optimum(self)
 
     monkeypatch.setattr(linear_program.GrowingProgram, "optimum", counted)
-    assert planning.plan(aimed(body, 3.0, 0.0), "optimal").cut
+    assert planning.plan(aimed(body, 3.0, 0.0), "optimal")._cut
     assert sum(sizes) < 200_000  # of 1.2 million
 
 

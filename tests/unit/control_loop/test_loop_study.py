@@ -215,7 +215,7 @@ def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(
         assert len(plan.flown_run.fired) == outputs["firings"]
         assert plan.propellant == pytest.approx(outputs["propellant"], rel=1e-9)
         assert plan.flown_run.case == case + 1
-        assert plan.flight.residual.momentum_shift == pytest.approx(
+        assert plan._flight.residual.momentum_shift == pytest.approx(
             outputs["momentum_shift"], abs=1e-9
         )
     monkeypatch.setattr("nutdamp.control_loop.dispersion.PORTION", 6)
@@ -437,7 +437,7 @@ def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> Non
     alone = []
     for case in range(12):
         seen = loop_of(watched, 60.0, seed=3, case=case)
-        angles = np.array([(each.least, each.largest) for each in seen.aspects])
+        angles = np.array([(each.least, each.largest) for each in seen._aspects])
         assert kept.angles[:, :, case] == pytest.approx(angles, abs=rad(2e-3))
         alone.append(seen.meets_requirement)
     assert len(set(alone)) == 2

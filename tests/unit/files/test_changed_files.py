@@ -336,7 +336,7 @@ def test_a_target_stays_where_it_is_in_space() -> None:
     file carried on.
     """
     plan = nutdamp.plan(nutdamp.read(SOUNDER + "goal: {tilt: 10 deg, azimuth: 45 deg}\n"), "none")
-    moved_on = later(plan.reaching(33.0), 33.0)
+    moved_on = later(plan._reaching(33.0), 33.0)
     carried = plan.carried(33.0)
     seen = [
         attitude.rotate(attitude.conjugate(moved_on.quaternion), plan.spacecraft.target_axis),

@@ -94,7 +94,7 @@ def test_the_frame_of_a_file_moves_nothing(plain: nutdamp.Plan, frame: str) -> N
         times = (other.t, other.on_time)
         assert (pulse.t, pulse.on_time) == pytest.approx(times, abs=SOLID)
     assert plan.propellant == pytest.approx(plain.propellant, rel=SOLID)
-    for aspect, same in zip(plan.aspects, plain.aspects, strict=True):
+    for aspect, same in zip(plan._aspects, plain._aspects, strict=True):
         assert (aspect.least, aspect.largest) == pytest.approx((same.least, same.largest))
 
 
@@ -149,7 +149,7 @@ def test_a_file_carried_on_is_in_the_frame_of_its_date(frame: str) -> None:
     time = 7.0 * 86400.0
     after = plan.carried(time)
     assert present(after.attitude).frame == frame
-    state = SpinState.of(*(part[0] for part in plan.reaching(time).motion(np.array([time]))))
+    state = SpinState.of(*(part[0] for part in plan._reaching(time).motion(np.array([time]))))
     end = replace(present(plan.spacecraft.attitude), quaternion=state.quaternion)
     expected = end.axes @ attitude.matrix(end.quaternion)
     seen = present(after.attitude).axes @ attitude.matrix(after.initial.quaternion)

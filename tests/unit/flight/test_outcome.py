@@ -385,12 +385,12 @@ def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     free = planning.plan(watching(TURNING), scheme)
     body = watching(TURNING, Keep("Sun", between(TURNING, 0.5), least=math.radians(3.0)))
     straight = planning.judged(body, scheme, free.pulses, free.options)
-    assert straight.astray is not None  # what is planned without the cone breaks it
+    assert straight._astray is not None  # what is planned without the cone breaks it
     assert "from Sun" in infeasibility(straight)
     routed = planning.plan(body, scheme)
     assert routed.feasible, infeasibility(routed)
-    assert present(routed.left).aim < 1e-6
-    assert routed.aspects[0].kept
+    assert present(routed._left).aim < 1e-6
+    assert routed._aspects[0].kept
     check_kept(routed)
     assert "goes-round" in codes(plan_notes(routed))
     assert 1.0 < routed.total_impulse / free.total_impulse < 1.3
@@ -401,7 +401,7 @@ def test_the_axis_may_be_held_within_a_cone() -> None:
     keep = Keep("Earth", between(TURNING, 0.5), most=math.radians(8.0))
     plan = planning.plan(watching(TURNING, keep), "rhumb-line")
     assert plan.feasible
-    assert plan.aspects[0].largest < math.radians(8.0)
+    assert plan._aspects[0].largest < math.radians(8.0)
 
 
 def test_a_target_within_a_cone_is_refused_and_damping_into_one_warned_of() -> None:
@@ -557,11 +557,11 @@ def test_the_requirement_must_be_kept_after_the_last_disturbance_too(
         disturbances=[burn],
     )
     plan = nutdamp.plan(body, scheme="none")
-    after = present(plan.disturbed)
+    after = present(plan._disturbed)
     assert plan.end == 0.0
     assert after.nutation == pytest.approx(plan.fly(60.0).residual.nutation, abs=1e-9)
     assert plan.meets_requirement is (after.nutation <= math.radians(0.5))
-    held = next(line for line in plan.held if line.bound.part is Part.NUTATION)
+    held = next(line for line in plan._held if line.bound.part is Part.NUTATION)
     assert held.left == after.nutation
 
 
@@ -576,5 +576,5 @@ def test_the_largest_nutation_under_a_torque_that_lasts_is_that_of_its_beat() ->
     across = 2.0 * 2.0 / (abs(body.nutation_rate) * inertia.A)
     most = math.atan(inertia.A * across / (inertia.C * body.spin))
     plan = nutdamp.plan(body, scheme="none")
-    (way,) = [line for line in plan.held if line.bound.keep is not None]
+    (way,) = [line for line in plan._held if line.bound.keep is not None]
     assert way.left == pytest.approx(most, rel=1e-6)

@@ -418,7 +418,7 @@ def numbers(text: str) -> list[float]:
 def test_rows_are_the_pulses_as_they_are_loaded() -> None:
     body = nutdamp.example()
     chosen = planning.plan(nutdamp.example(), "two-pulse")
-    _, after = chosen.flight.around_pulses()
+    _, after = chosen._flight.around_pulses()
     for row, pulse, left in zip(
         sheet(example(), "Fire"), chosen.pulses, np.degrees(after.nutation), strict=True
     ):
@@ -597,7 +597,7 @@ def test_the_nutation_after_each_pulse_is_that_of_the_reference() -> None:
     """Nutation and Sun angle after each pulse against Euler's equations by DOP853."""
     body = turning(FILE, 3.0, 0.5)
     plan = planning.plan(body, "rhumb-line")
-    _, after = plan.flight.around_pulses()
+    _, after = plan._flight.around_pulses()
     motion = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion))
     now = 0.0
     moments = np.asarray(body.inertia.moments)
@@ -675,12 +675,12 @@ def test_what_the_board_asks_for_is_on_the_page() -> None:
 def test_pulses_have_date_phase_and_cones() -> None:
     body = compared_ace().spacecraft
     chosen = present(compared_ace().recommended)
-    around = dict(zip(("before", "after"), chosen.flight.around_pulses(), strict=True))
+    around = dict(zip(("before", "after"), chosen._flight.around_pulses(), strict=True))
     for index, (pulse, row) in enumerate(
         zip(chosen.pulses, sheet(ace(), "Pulses of"), strict=True)
     ):
         assert f"T{row['start UTC']}Z" in (body.utc(pulse.start, 3) or "")
-        x, y, _ = attitude.matrix(chosen.flight.motion(np.array([pulse.start]))[1][0]).T @ present(
+        x, y, _ = attitude.matrix(chosen._flight.motion(np.array([pulse.start]))[1][0]).T @ present(
             body.sun
         )
         assert float(row["Sun phase deg"]) == pytest.approx(
@@ -906,7 +906,7 @@ def test_the_command_in_the_caption_gives_the_rows_of_the_view(
             f"{header}\n1,J2,6,1,1,0.972287825122,0.487394\n", encoding="utf-8"
         )
         plan = planning.Plan(
-            body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), from_file=True
+            body, "b 2.csv", fired(body, read_blocks("b 2.csv", body)[0]), _from_file=True
         )
     elif name == "schedule":
         planning.plan(body, "two-pulse").to_csv("p 2.csv")

@@ -118,16 +118,16 @@ class Given(Judged):
     speed: float | None = None
 
     @property
-    def kept(self) -> bool | None:
+    def _kept(self) -> bool | None:
         return False if self.strays else None
 
     @property
-    def held(self) -> tuple[Held, ...]:
+    def _held(self) -> tuple[Held, ...]:
         broken = Held(Bound(Part.CONE, 0.2, True, Keep("star", None, most=0.2)), 0.3)
-        return (*super().held, *[broken] * self.strays)
+        return (*super()._held, *[broken] * self.strays)
 
     @property
-    def delta_v(self) -> Vector | None:
+    def _delta_v(self) -> Vector | None:
         return None if self.speed is None else self.speed * np.array([0.6, 0.0, -0.8])
 
 
@@ -170,11 +170,11 @@ def test_the_plan_to_fly_what_decided_and_the_notes_on_it_and_on_what_is_missed(
         found = recommend(plans)
         assert found.plan is not None
         assert (found.plan.scheme, found.ground) == (best, Ground[ground]), what
-        assert found.standing is found.plan.standing
+        assert found.standing is found.plan._standing
         equals = [
             one
             for one in plans
-            if one.feasible and (one.standing, one.kept) == (found.standing, found.plan.kept)
+            if one.feasible and (one._standing, one._kept) == (found.standing, found.plan._kept)
         ]
         assert found.count == len(equals), what
         if ground != "COST" or what.startswith(("of what", "where")):
@@ -362,7 +362,7 @@ def test_a_scheme_that_cannot_set_the_spin_says_so_and_a_spin_that_stays_takes_n
     compared = compare(body, (*catalogue.CLASSIC, "half-cone"))
     assert {one.feasible for one in compared.plans} == {False}
     check_text(
-        "plan.spin-not-set", "\n".join(sorted({one.refusal or "" for one in compared.plans}))
+        "plan.spin-not-set", "\n".join(sorted({one._refusal or "" for one in compared.plans}))
     )
     assert "optimal" in usual(body)
     assert planning.plan(body, "none").meets_requirement is False
@@ -449,8 +449,8 @@ def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed(
     given = fired(0.1), fired(0.2, BLOCK), made("none", 0.1, 0.0, pulses=0, required=BOTH)
     bodies = [replace(given[0].spacecraft, commands=one) for one in (None, commands)]
     for_free, commanded = ([replace(one, spacecraft=body) for one in given] for body in bodies)
-    assert [one.commandable for one in for_free] == [True] * 3
-    assert [one.commandable for one in commanded] == [False, True, True]
+    assert [one._commandable for one in for_free] == [True] * 3
+    assert [one._commandable for one in commanded] == [False, True, True]
     timed, block, none = commanded
     assert Comparison(bodies[0], (for_free[1], for_free[0])).recommended is for_free[0]
     for plans, named, free, eligible in (

@@ -548,7 +548,7 @@ def test_the_robust_plan_with_commands_can_be_commanded_unless_pulses_may_be_tim
         assert {each.plan.scheme for each in found.candidates} == (
             {"command-block"} if commanded else {plan.scheme for plan in one}
         )
-        assert best(found).plan.commandable is commanded
+        assert best(found).plan._commandable is commanded
 
 
 # --- how many cases the plans of a comparison fly: as many as it takes to know what to recommend

@@ -341,7 +341,7 @@ def test_a_cone_is_a_bound_like_any_other_whatever_is_left_at_the_end() -> None:
     )
     assert (line.nominal, line.margin) == (aspect.least, aspect.least - math.radians(16.0))
     four = planning.plan(watched(16.0), "four-pulse")
-    assert (four.meets_requirement, four.ends_well, broken.tightest) == (False, True, line)
+    assert (four.meets_requirement, four._ends_well, broken.tightest) == (False, True, line)
     assert (
         planning.judge(replace(four, spacecraft=replace(watched(16.0), requirement=None))).status
         is Status.NOT_ENOUGH
@@ -576,7 +576,7 @@ def test_no_scheme_is_said_to_leave_the_least_where_another_leaves_less() -> Non
     compared = compare(
         nutdamp.load(places.CONFIGS / "ace.yaml"), ("two-pulse", "four-pulse", "optimal")
     )
-    left = {plan.scheme: plan.flight.residual.nutation for plan in compared if plan.feasible}
+    left = {plan.scheme: plan._flight.residual.nutation for plan in compared if plan.feasible}
     assert max(left.values()) > 1.2 * min(left.values())
     for plan in compared:
         assert remaining(plan).code == "remains-rounding"
@@ -603,8 +603,8 @@ def test_ticks_explain_what_rounding_to_them_can_leave() -> None:
         )
         made = Schedule((channel_pulse(body.channels[0], 1.0, 0.1),))
         plan = planning.Plan(body, "four-pulse", made)
-        left = replace(plan.flight.residual, nutation=share * most)
-        vars(plan)["flight"] = SimpleNamespace(residual=left)
+        left = replace(plan._flight.residual, nutation=share * most)
+        vars(plan)["_flight"] = SimpleNamespace(residual=left)
         assert (remaining(plan).code, hindrances(plan)) == (obstacle, ((), suspected))
 
 
@@ -706,8 +706,8 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
     """
     free = nutdamp.example().replace(requirement=Requirement(nutation=math.radians(0.5)))
     turning, steady = (planning.plan(free, scheme) for scheme in ("one-pulse", "two-pulse"))
-    turned = turning.flight.residual.momentum_shift
-    assert turned > math.radians(0.1) > steady.flight.residual.momentum_shift
+    turned = turning._flight.residual.momentum_shift
+    assert turned > math.radians(0.1) > steady._flight.residual.momentum_shift
     goal = replace(turning, spacecraft=replace(free, goal=Goal(axis=free.direction_in_n(0.1, 0.0))))
     limited = planning.plan(nutdamp.example(), "one-pulse")
     plans = (turning, steady, goal, limited)
@@ -820,7 +820,7 @@ def test_plans_that_keep_the_cones_are_named_where_the_recommended_one_does_not(
         "star", body.direction_in_n(math.radians(8.0), math.radians(210.0)), math.radians(5.2)
     )
     compared = compare(replace(body, keep=(star,)), catalogue.CLASSIC, samples=0)
-    assert [plan.kept for plan in compared] == [True, False, False]
+    assert [plan._kept for plan in compared] == [True, False, False]
     alone = Comparison(compared.spacecraft, (compared["two-pulse"],))
     assert one_of(comparison_warnings(compared), "plans-keep-cones")["schemes"] == "one-pulse"
     assert "plans-keep-cones" not in codes(comparison_warnings(alone))
@@ -844,7 +844,7 @@ class Given(planning.Plan):
     off: float = 0.0
 
     @property
-    def flight(self) -> Any:
+    def _flight(self) -> Any:
         return SimpleNamespace(residual=SimpleNamespace(axis_error=self.off))
 
 
@@ -983,7 +983,7 @@ def test_fronts_that_are_searched_fly() -> None:
         assert leasts == sorted(leasts, reverse=True)
         for point in front.points:
             assert violations(BODY, point.plan.pulses) == []
-            left = point.plan.flight.residual
+            left = point.plan._flight.residual
             assert left.nutation < math.radians(1e-6)
             assert left.momentum_shift <= front.shift + math.radians(1e-6)
             assert present(point.bounds.rigorous) <= point.cost * (1 + 1e-9)
@@ -1028,7 +1028,7 @@ def test_no_front_holds_what_a_schedule_of_another_front_beats_in_everything() -
     ):
         same = math.isclose(point.cost, other.cost, rel_tol=SAME_COST)
         sooner = other.plan.end < 0.999 * point.plan.end
-        near = other.plan.flight.residual.axis_error <= point.plan.flight.residual.axis_error
+        near = other.plan._flight.residual.axis_error <= point.plan._flight.residual.axis_error
         assert not (near and sooner and (same or other.cost < point.cost))
 
 
@@ -1041,7 +1041,7 @@ def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(
     made = planning.plan(body, "optimal", nutdamp.OptimalOptions(free_axis=False))
     monkeypatch.setattr(work, "FRONTS", 4_000.0)
     (front,) = tradeoff.fronts(body, nutdamp.OptimalOptions(), count=3, shifts=(0.0,))
-    assert [(point.plan.end, point.cost, point.plan.cut) for point in front.points] == [
+    assert [(point.plan.end, point.cost, point.plan._cut) for point in front.points] == [
         (made.end, made.pulses.cost_in("kg"), False)
     ]
     assert front.why is None

@@ -84,7 +84,7 @@ def check_opposed(spacecraft: Spacecraft, made: Schedule) -> None:
 
 
 def rate_after(plan: planning.Plan) -> float:
-    return abs(plan.flight.settled.omega)
+    return abs(plan._flight.settled.omega)
 
 
 def why_not(*cases: tuple[str, Spacecraft] | tuple[str, Spacecraft, Options]) -> str:
@@ -157,7 +157,7 @@ def test_skew_channels_change_the_spin_by_their_axial_impulse_over_c(
     axial = math.fsum(pulse.impulse[2] for pulse in plan.pulses)
     outcome = Outcome(spacecraft, plan.pulses)
     assert axial != 0.0
-    assert plan.spin_change == pytest.approx(axial / 80.0, rel=1e-9)
+    assert plan._spin_change == pytest.approx(axial / 80.0, rel=1e-9)
     assert outcome.spin - 3.0 == pytest.approx(axial / 80.0, abs=1e-11)
     assert outcome.nutation == pytest.approx(
         left(plan).nutation if scheme == "two-pulse" else 0.0, abs=1e-10
@@ -552,7 +552,7 @@ def test_a_channel_that_wastes_fires_where_the_others_are_not_enough(
     body = spinner(channels=wasting(share), limits=limits, requirement=Requirement(allowed))
     plan = feasible_by("four-pulse", body, options)
     assert len({pulse.channel for pulse in plan.pulses}) == firing
-    assert plan.flight.residual.nutation <= allowed
+    assert plan._flight.residual.nutation <= allowed
     alone = planning.plan(replace(body, channels=STRONG), "four-pulse", options).pulses
     if firing == 2:
         assert [pulse.t for pulse in plan.pulses] == [pulse.t for pulse in alone]

@@ -152,12 +152,12 @@ def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: in
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
     momentum = reference.momentum(moments, motion)
     near = 1e-3 * body.to_turn
-    assert reference.angle(momentum, plan.flight.final.momentum) < near
+    assert reference.angle(momentum, plan._flight.final.momentum) < near
     assert reference.angle(momentum, body.target_axis) == pytest.approx(
-        float(present(plan.left).aim), abs=near
+        float(present(plan._left).aim), abs=near
     )
     nutation = reference.nutation(moments, motion.rates, math.copysign(1.0, body.spin))
-    assert nutation == pytest.approx(float(present(plan.left).nutation), abs=near)
+    assert nutation == pytest.approx(float(present(plan._left).nutation), abs=near)
 
 
 THEMIS = load(places.case("two-pulses-a-turn.yaml"))
@@ -279,7 +279,7 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(
     rows = np.argsort(singles.share)[:200]
     search.flights.fly([search.blocks(singles, int(row)) for row in rows], [0.0] * len(rows))
     least = search.flights.best().rank[1]
-    assert planned(body, ONE, met=False).severity <= 1.02 * max(least, 1.0)
+    assert planned(body, ONE, met=False)._severity <= 1.02 * max(least, 1.0)
 
 
 @pytest.mark.weekly
@@ -289,8 +289,8 @@ def test_more_blocks_are_tried_where_one_block_does_not_do() -> None:
     plan, single = planned(tight, met=False), planned(tight, ONE, met=False)
     assert len(single.pulses.blocks) == 1
     assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
-    assert plan.severity <= single.severity
-    assert planned(replace(some_body(2), requirement=within(0.1, 0.1)), met=False).severity < 2.0
+    assert plan._severity <= single._severity
+    assert planned(replace(some_body(2), requirement=within(0.1, 0.1)), met=False)._severity < 2.0
 
 
 @pytest.mark.deep
@@ -301,7 +301,7 @@ def test_a_looser_requirement_is_met_as_well() -> None:
         plan = planned(
             replace(commanded(body, np.array([1.0, -0.3, 0.1])), requirement=within(most))
         )
-        assert present(plan.left).nutation < min(math.radians(most), body.nutation)
+        assert present(plan._left).nutation < min(math.radians(most), body.nutation)
 
 
 @pytest.mark.weekly
@@ -334,7 +334,7 @@ def test_blocks_keep_out_of_blackout_windows(tight: bool) -> None:
     assert any(pulse.end > begins and pulse.start < ends for pulse in free)
     assert not any(pulse.end > begins and pulse.start < ends for pulse in plan.pulses)
     assert len(plan.pulses.blocks) > tight
-    assert math.degrees(float(present(plan.left).aim)) < 1.0
+    assert math.degrees(float(present(plan._left).aim)) < 1.0
 
 
 @pytest.mark.weekly
@@ -347,7 +347,7 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     keep = Keep("Earth", middle / np.linalg.norm(middle), least=math.radians(1.5))
     plan = planned(replace(straight, keep=(keep,)))
     assert "goes-round" in codes(plan.pulses.notes)
-    assert aspects(plan.flight)[0].kept
+    assert aspects(plan._flight)[0].kept
     assert len(plan.pulses.blocks) > 1
     _, starts = flown_by_reference(plan.spacecraft, plan.pulses.blocks)
     assert [one.start for one in plan.pulses] == pytest.approx(starts, abs=1e-7)
@@ -416,7 +416,7 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
         "no widths": replace(NARROW, channels=NARROW.channels[1:]),
     }
     plans = {name: planning.plan(each, "command-block") for name, each in cases.items()}
-    assert all(plan.failure is None for plan in plans.values())
+    assert all(plan._failure is None for plan in plans.values())
     for name, aim in (
         ("no keys", False),
         ("out of view", True),
@@ -858,7 +858,9 @@ def test_a_valve_without_delays_changes_no_block_and_a_late_one_the_delay_alone(
     (block,), (before,) = slow.pulses.blocks, plain.pulses.blocks
     assert (block.count, block.width) == (before.count, before.width)
     assert block.delay == pytest.approx(before.delay - 0.015, abs=1e-9)
-    assert slow.flight.residual.nutation == pytest.approx(plain.flight.residual.nutation, abs=1e-6)
+    assert slow._flight.residual.nutation == pytest.approx(
+        plain._flight.residual.nutation, abs=1e-6
+    )
 
 
 def missed(body: nutdamp.Spacecraft, made: Schedule) -> float:
@@ -1147,7 +1149,7 @@ def test_where_the_spin_cannot_be_set_the_reason_is_said() -> None:
         "no time": replace(body, limits=Limits(horizon=2.0 * math.pi / abs(body.spin))),
     }
     plans = {name: planning.plan(each, "command-block") for name, each in cases.items()}
-    assert all(plan.failure is None and not plan.feasible for plan in plans.values())
+    assert all(plan._failure is None and not plan.feasible for plan in plans.values())
     check_text(
         "blocks.no-spin",
         "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()),

@@ -214,7 +214,7 @@ def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     assert {pulse.on_time for pulse in equal(plan)} == {on_time}
     assert "fixed-length" not in codes(plan_notes(plan))
     cut = replace(plan, schedule=replace(plan.pulses, pulses=plan.pulses.pulses[:-1]))
-    off = math.degrees(max(present(cut.flown).nutation, present(cut.left).aim))
+    off = math.degrees(max(present(cut.flown).nutation, present(cut._left).aim))
     assert one_of(plan_notes(cut), "fixed-length")["off_deg"] == pytest.approx(off)
 
 

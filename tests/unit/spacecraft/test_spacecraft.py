@@ -276,7 +276,7 @@ def test_a_file_carried_on_has_it_where_it_is_then() -> None:
     carried = plan.carried()
     assert used > 0.0
     assert carried.center_of_mass == pytest.approx([0.1, 0.0, 0.4 - 0.05 * used], abs=1e-12)
-    assert later(plan.flight, plan.end).after.center_of_mass == pytest.approx(
+    assert later(plan._flight, plan.end).after.center_of_mass == pytest.approx(
         [0.1, 0.0, 0.4 - 0.05 * used]
     )
 

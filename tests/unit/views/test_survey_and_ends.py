@@ -357,7 +357,7 @@ def test_final_is_where_the_reference_integrator_ends() -> None:
     plan = planning.plan(body, "two-pulse")
     assert plan.feasible
     outcome = Outcome(body, plan.pulses)
-    final = final_json(plan.flight)
+    final = final_json(plan._flight)
     ends = {
         "axis": outcome.motion.rotation @ np.array([0.0, 0.0, -1.0]),
         "momentum": reference.momentum(body.inertia.moments, outcome.motion),
@@ -378,7 +378,7 @@ def test_final_is_where_the_reference_integrator_ends() -> None:
 
 def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
     body = spinner(steerable=Steerable())
-    assert final_json(planning.plan(body, "two-pulse").flight)["momentum"]["azimuth_deg"] is None
+    assert final_json(planning.plan(body, "two-pulse")._flight)["momentum"]["azimuth_deg"] is None
     assert target_json(body) is None
     infeasible = plan_json(planning.Plan(body, "two-pulse", None, "why"))
     assert (infeasible["final"], infeasible["target"]) == (None, None)
@@ -509,7 +509,7 @@ def test_a_screen_rounds_a_date_to_the_millisecond() -> None:
     """
     pulses = Schedule(tuple(map(steered, (1.0, 2.0009, 3.0004))))
     table = pulse_table(
-        planning.Plan(dated("2026-03-01T23:59:58.9997Z"), "x", pulses).flight
+        planning.Plan(dated("2026-03-01T23:59:58.9997Z"), "x", pulses)._flight
     ).screen("full")
     column = next(column for column in table.columns if str(column.header).endswith("UTC"))
     assert list(map(str, column.cells)) == [

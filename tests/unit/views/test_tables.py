@@ -164,11 +164,11 @@ def test_files_of_pulses_and_blocks_have_the_names_that_are_read_again(name: str
     plan = nutdamp.plan(nutdamp.load(CONFIGS / f"{name}.yaml"), "optimal")
     if not plan.feasible:
         pytest.skip("optimal is infeasible here")
-    names = pulse_table(plan.flight).array().dtype.names or ()
+    names = pulse_table(plan._flight).array().dtype.names or ()
     dated = plan.spacecraft.utc(0.0) is not None
     valves = any(pulse.through_valve for pulse in plan.pulses)
     assert names == (*PULSES_HEADER, *(EFFECTIVE * valves), *(("utc",) * dated))
-    assert tuple(next(csv.reader(io.StringIO(block_table(plan.flight).csv())))) == BLOCKS_HEADER
+    assert tuple(next(csv.reader(io.StringIO(block_table(plan._flight).csv())))) == BLOCKS_HEADER
 
 
 def test_an_angle_of_a_row_is_in_degrees_and_unknown_where_a_step_to_it_is() -> None:

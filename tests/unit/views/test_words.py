@@ -127,13 +127,13 @@ TILTING = (Disturbance(0.5 + 0j),)
 
 def test_the_parts_that_are_missed_and_by_how_much() -> None:
     plan = judged("a", 0.6, shift=0.3, required=BOTH, goal=WIDE, spin=4.0)
-    assert [bound.part for bound in plan.shortfalls] == [
+    assert [bound.part for bound in plan._shortfalls] == [
         requirements.Part.NUTATION,
         requirements.Part.SHIFT,
         requirements.Part.SPIN,
     ]
-    assert plan.severity == pytest.approx(1.0 / 0.03)
-    assert planning.Plan(plan.spacecraft, "x", None, "why").severity == math.inf
+    assert plan._severity == pytest.approx(1.0 / 0.03)
+    assert planning.Plan(plan.spacecraft, "x", None, "why")._severity == math.inf
 
 
 def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
@@ -142,12 +142,12 @@ def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
     """
     body = aimed(replace(FIRED, requirement=Requirement(None, math.radians(1.0))), 10.0, 40.0)
     plan = planning.plan(body, "one-pulse")
-    assert plan.severity == pytest.approx(
+    assert plan._severity == pytest.approx(
         off_target(body, plan.pulses) / math.radians(1.0), rel=1e-9
     )
     assert present(plan.flown).momentum_shift < 0.9 * present(plan.flown).axis_error
     free = replace(plan, spacecraft=replace(body, requirement=None))
-    assert free.severity == pytest.approx(off_target(body, plan.pulses), rel=1e-9)
+    assert free._severity == pytest.approx(off_target(body, plan.pulses), rel=1e-9)
 
 
 def test_the_severity_of_many_is_that_of_each() -> None:
@@ -183,7 +183,7 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
     for degrees, limit, goal, needless in rows:
         body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=limit), goal=goal)
         assert requirements.unaided(body) is needless
-        assert (planning.plan(body, "none").standing is planning.Standing.COMPLIES) is needless
+        assert (planning.plan(body, "none")._standing is planning.Standing.COMPLIES) is needless
         assert (
             nutdamp.compare(body, ("none", "four-pulse")).verdict.status is Status.NO_PULSE
         ) is needless

@@ -211,7 +211,7 @@ def test_several_short_pulses_in_each_half_turn_damp(
     assert min(pauses) > max(
         0.9 * max(one.min_on_time for one in body.channels), body.limits.gap - 1e-9
     )
-    assert plan(body, "four-pulse").severity > math.radians(degrees - 4.2)
+    assert plan(body, "four-pulse")._severity > math.radians(degrees - 4.2)
 
 
 @pytest.mark.parametrize(
@@ -529,8 +529,8 @@ def test_a_nutation_smaller_than_any_pulse_has_no_schedule(wheel: float) -> None
     made = plan(
         read_spacecraft(f"{text}\nwheel: {{momentum: {wheel} N m s}}\n", "craft.yaml"), "optimal"
     )
-    assert made.failure is None
-    assert "without min_on_time there is a schedule" in (made.refusal or "")
+    assert made._failure is None
+    assert "without min_on_time there is a schedule" in (made._refusal or "")
 
 
 @pytest.mark.parametrize("name", ["continuous-opt507", deep("continuous-opt513")])
