@@ -210,7 +210,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
     still = [each for each in spacecraft.disturbances if each.rate == -spacecraft.spin]
     if still and plan.flown is not None:
         lasts = min(max(each.end for each in still), spacecraft.watched_until(plan.end))
-        drift = abs(plan.flight.settled.spin - spacecraft.spin) * lasts
+        drift = abs(plan._flight.settled.spin - spacecraft.spin) * lasts
         if drift > DRIFT:
             yield note("inertial-torque-drifts", drift_deg=math.degrees(drift), until_s=lasts)
     now = spacecraft.nutation

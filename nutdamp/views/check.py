@@ -453,8 +453,8 @@ def _faults_json(faults: Sequence[Fault]) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True, eq=False)
 class CheckedFile(Data):
-    """A valid ``spacecraft`` file, with ``doubts``: warnings on unlikely numbers; ``data``: its entry
-    in JSON.
+    """A valid ``spacecraft`` file, with ``doubts``: warnings on unlikely numbers; ``data``: its
+    entry in JSON.
     """
 
     spacecraft: Spacecraft

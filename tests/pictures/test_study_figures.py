@@ -422,7 +422,7 @@ def test_the_acceptance_box_names_every_scheme_with_cost_and_share() -> None:
         (label,) = [text for text in words if text.startswith(f"{plan.scheme} ")]
         assert label.startswith(f"{plan.scheme} {spent(plan.pulses)}, {share_text(verdict.cases)}")
     (off,) = [text for text in words if text.startswith("one-pulse")]
-    shift = math.degrees(compared["one-pulse"].flight.residual.momentum_shift)
+    shift = math.degrees(compared["one-pulse"]._flight.residual.momentum_shift)
     assert off.endswith(f": {shift:.3g}°")
     assert len(axes.patches) == 1, "the recommended one is filled"
 
@@ -433,7 +433,7 @@ def test_without_cases_schemes_are_points_and_a_missing_limit_is_no_edge() -> No
     (axes,) = compared.figure("box").axes
     assert axes.get_ylabel() == "momentum shift, ° (no limit)"
     dots = [np.asarray(one.get_xydata())[0] for one in axes.lines if one.get_marker() == "o"]
-    shifts = [math.degrees(plan.flight.residual.momentum_shift) for plan in compared]
+    shifts = [math.degrees(plan._flight.residual.momentum_shift) for plan in compared]
     assert sorted(dot[1] for dot in dots) == pytest.approx(sorted(shifts), abs=1e-9)
 
 

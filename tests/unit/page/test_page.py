@@ -1149,7 +1149,7 @@ def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
 def test_cones_that_dwarf_the_nutation_are_not_on_its_scale() -> None:
     """A despun body turns about an axis square to its own: μ is 90°, whatever θ is."""
     body = nutdamp.load(places.CONFIGS / "despun-comsat.yaml")
-    made = planning.plan(body, "two-pulse").flight
+    made = planning.plan(body, "two-pulse")._flight
     strip, (low, high) = moving.strip_of(made, made.sampled(200, 60.0), 60.0)
     assert not strip.cones
     assert -0.1 < low < 0.0 < 0.5 < high < 0.6
