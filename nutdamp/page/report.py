@@ -322,7 +322,7 @@ def _fired(chosen: Plan) -> document.Sheet:
     """Pulses of the first screen, or command blocks."""
     limit = glance.limits(chosen.spacecraft)[0]
     blocks = bool(chosen.pulses.blocks)
-    table = block_table(chosen._flight) if blocks else pulse_table(chosen.flight, limit=limit)
+    table = block_table(chosen._flight) if blocks else pulse_table(chosen._flight, limit=limit)
     shown = document.sheet(table, "screen")._replace(title="Blocks" if blocks else "Pulses")
     if len(shown.rows) <= SHOWN:
         return shown
