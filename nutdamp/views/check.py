@@ -73,7 +73,7 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
             "screen json",
             kind=TEXT,
         ),
-        Column("", Shared.ON_TIME, "", on_times, where="screen"),
+        Column("", Shared.ON_TIME, "", on_times, where="screen", rank=2),
         *file_columns(
             "json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"
         ),
@@ -84,7 +84,9 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
             lambda step: small_angle(step) if step else "any",
             "screen json",
         ),
-        Column.named("largest_step_deg=largest", "largest step", "deg", small_angle, "screen json"),
+        Column.named(
+            "largest_step_deg=largest", "largest step", "deg", small_angle, "screen json", rank=1
+        ),
         *file_columns("json", "damps=channel.damps"),
     )
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
@@ -100,9 +102,15 @@ def channel_topics(spacecraft: Spacecraft, name: str) -> Iterator[Topic]:
         if channel.name == name:
             force = 0.0 if channel.force is None else math.hypot(*channel.force)
             arm = f"{channel.strength / force:.4g} m" if force else "not known"
+            impulses = [
+                f"{channel.strength * time:.4g}"
+                for time in (channel.min_on_time, channel.max_on_time)
+                if math.isfinite(time)
+            ]
             rows = [
                 ("thrusters", ", ".join(thruster.name for thruster in channel.thrusters)),
                 ("arm", arm),
+                ("impulse, N m s", " to ".join([*impulses, "any"][:2])),
                 *zip(headings[1:], cells[1:], strict=True),
             ]
             text = "\n".join(f"- **{heading}**: {cell}" for heading, cell in rows)

@@ -16,6 +16,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note
 from nutdamp.files.export import column, cone_columns
 from nutdamp.flight.propagation import IDEAL_IMPULSES, model_name
 from nutdamp.montecarlo.inputs import DispersedInput
@@ -41,7 +42,7 @@ from nutdamp.views.tables import (
     to_figures,
     values_of,
 )
-from nutdamp.views.text import degrees, digits
+from nutdamp.views.text import degrees, digits, ordered, screen_line
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.controller import Ending
@@ -100,8 +101,12 @@ EMPTY = (
 """Note on a case whose tank runs empty."""
 
 
-def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) -> RenderableType:
-    """The screen of ``disperse``: verdict, percentiles, what counts most, and worst cases."""
+def dispersion_screen(
+    flown: Dispersion, *, worst: int, verbose: bool = True, planned: Sequence[Note] = ()
+) -> RenderableType:
+    """The screen of ``disperse``: verdict, percentiles, what counts most, and worst cases;
+    ``planned``: notes on the plan that it flies.
+    """
     results, judged, spacecraft = flown.core, flown.verdict, flown.plan.spacecraft
     study = results.study
     ideal = model_name([study.model.schedule]) == IDEAL_IMPULSES
@@ -123,7 +128,7 @@ def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) ->
         return summary(
             [*head, *emptied],
             lambda **_: percentiles.screen("screen"),
-            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused)],
+            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused), *planned],
             f"--plot cases.png{case}",
         )
     parts = [*head, Text(), percentiles.screen("full"), angles_note(spacecraft)]
@@ -140,7 +145,8 @@ def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) ->
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
         parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim"))
-    return Group(*parts, *tolerances.unused_table(study.model.inputs.unused))
+    parts += tolerances.unused_table(study.model.inputs.unused)
+    return Group(*parts, *map(screen_line, ordered(planned)))
 
 
 def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import parts
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.tables import (
@@ -179,7 +180,8 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         angle = angle_of(f"flown.{name}")
         if "screen" in where:
             short = shortly(largest[name != "nutation"])
-            residuals.append(Column("", heading, "", angle, short, "screen"))
+            order = 0 if name == "nutation" else 2
+            residuals.append(Column("", heading, "", angle, short, "screen", rank=order))
         where = f"{where.removeprefix('screen ')} csv"
         residuals.append(Column(f"{name}_deg", heading, "deg", angle, small_angle, where))
     axes, momenta = [], []
@@ -208,9 +210,9 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         Column("status", "", "", status, where="csv", kind=TEXT),
         Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
         Column("met_fraction", "", "", share, where="csv"),
-        Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE, rank=3),
         Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE),
-        Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen"),
+        Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen", rank=1),
         Column.named("end_s=schedule.end", "end", "s", "{:.3f}".format, "full page csv"),
         Column.named(
             "total_impulse_Nms=schedule.total_impulse",
@@ -292,11 +294,14 @@ def _bound(bound: Bound, plan: Plan) -> str:
     return shown if line.met else f"{NOT} {shown}"
 
 
-def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> RenderableType:
+def glance(
+    compared: Comparison, robust: Sequence[Note] | None = None, *, file: str = ""
+) -> RenderableType:
     """The screen of a comparison and the plan to fly, one of those compared, or of the reason why
     there is none.
 
-    ``robust``: notes on the choice, where dispersed cases made it.
+    ``robust``: notes on the choice, where dispersed cases made it; ``file``: of the spacecraft, as
+    commands name it.
     """
     judged, plan = compared.verdict, compared.recommended
     head = [*parts.title(compared.spacecraft), headline(compared)]
@@ -304,12 +309,12 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
     ending: list[RenderableType] = []
     if plan is not None:
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
-        ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
+        ending = [verdicts.bound_table(judged).screen("screen"), axis_line(plan), Text()]
         if plan.pulses.blocks:
             fired = parts.block_table(plan.flight)
         else:
             fired = parts.pulse_table(plan.flight, limit=limits(compared.spacecraft)[0])
-    schemes = scheme_table(compared, plan).screen("screen", between=" ")
+    schemes = scheme_table(compared, plan).screen("screen")
 
     def table(first: int | None = None) -> RenderableType:
         rows = (
@@ -319,11 +324,26 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
         )
         return Group(*rows, schemes)
 
-    written = (
-        "--blocks blocks.csv" if plan is not None and plan.pulses.blocks else "--csv pulses.csv"
-    )
     every = [*(robust or ()), *notes(compared, robust=robust is not None)]
-    return parts.summary(head, table, every, f"{written} · --plot plan.png · nutdamp report")
+    return parts.summary(head, table, every, parts.STEP.join(steps(plan, file)), lines=LINES)
+
+
+LINES = (24, 30)  # of the screen, and of one narrower than 80 characters
+
+
+def steps(plan: Plan | None, file: str) -> Iterator[str]:
+    """What tells more about the plan to fly, or takes it further."""
+    blocks = plan is not None and bool(plan.pulses.blocks)
+    channel = (
+        next((pulse.channel for pulse in plan.pulses if pulse.channel != STEERABLE), "")
+        if plan
+        else ""
+    )
+    if channel:
+        yield f"nutdamp explain {channel} {file}".rstrip()
+    yield "--blocks blocks.csv" if blocks else "--csv pulses.csv"
+    yield "--plot plan.png"
+    yield "nutdamp report"
 
 
 def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
@@ -365,22 +385,36 @@ def ends(plan: Plan) -> Table:
     if not spacecraft.inertia.wheel and residual.body_cone < 0.5 * math.pi:
         angles.append(f"body cone {short_angle(residual.body_cone, limit)}")
         angles.append(f"space cone {short_angle(residual.space_cone, limit)}")
-    rows = [("after pulses, deg", "  ".join(angles))]
-    axis = ", ".join(
-        f"{SHORT_NAMES.get(column.heading, column.heading)} {column.worded(flight.final.axis)}"
-        for column in parts.direction_columns(spacecraft)
-    )
     if spacecraft.goal.axis is None:
         momentum = f"turned by {short_angle(residual.momentum_shift, turn)} deg"
     else:
         momentum = f"{short_angle(residual.axis_error, turn)} deg off target"
         momentum += parts.by_the_sun(spacecraft)
-    final = flight.final.spin
-    spin = "" if requirements.spins_at(spacecraft, final) else f"; spin {final * RPM:.5g} rpm"
-    rows.append(("axis", f"{axis}; H {momentum}{spin}"))
+    rows = [("after pulses, deg", "  ".join(angles)), ("H", momentum), ("axis", _axis(plan))]
     if len(plan.pulses) and lasting(flight):
         rows.append(("", lasting(flight)))
     return facts(rows)
+
+
+def axis_line(plan: Plan) -> Text:
+    """Where the spin axis points after the pulses, and what changes it then."""
+    later = lasting(plan.flight) if len(plan.pulses) else ""
+    return Text.assemble(("axis  ", "dim"), _axis(plan), f" {later}" if later else "")
+
+
+def _axis(plan: Plan) -> str:
+    spacecraft, final = plan.spacecraft, plan.flight.final
+    angles = [
+        (SHORT_NAMES.get(column.heading, column.heading), column.shown(final.axis))
+        for column in parts.direction_columns(spacecraft)
+    ]
+    axis = ", ".join(f"{name} {angle}" for name, angle in angles)
+    spin = (
+        ""
+        if requirements.spins_at(spacecraft, final.spin)
+        else f"; spin {final.spin * RPM:.5g} rpm"
+    )
+    return f"{axis} deg{spin}"
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:

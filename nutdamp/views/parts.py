@@ -5,13 +5,14 @@ blocks, notes.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.table import Table
 from rich.text import Text
 
@@ -33,6 +34,7 @@ from nutdamp.views.tables import (
     WIDTH,
     Column,
     DataTable,
+    FittedColumns,
     Shared,
     facts,
     lines_of,
@@ -44,6 +46,8 @@ from nutdamp.views.text import (
     degrees,
     digits,
     duration,
+    fixed,
+    is_detail,
     limit_text,
     longitude,
     mass,
@@ -52,6 +56,7 @@ from nutdamp.views.text import (
     pointing,
     quantity,
     quiet,
+    rank,
     screen_line,
     severity,
     short_angle,
@@ -87,7 +92,7 @@ def channel_text(pulse: Pulse, spacecraft: Spacecraft) -> str:
 
 def seconds(value: float) -> str:
     """A time within a schedule to a tenth of a millisecond."""
-    return f"{value:.4f}"
+    return fixed(value, 4)
 
 
 def _cone(name: str, when: str, where: str) -> Column:
@@ -236,6 +241,7 @@ def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
         lambda row: math.degrees(row.phase) % 360.0,
         lambda angle: f"{angle:.1f}",
         PEOPLE,
+        rank=1,
     )
     return (columns[0], start, phase, *columns[1:])
 
@@ -291,6 +297,7 @@ BLOCKS = (
         partial(_counts, "delay"),
         where=EVERYWHERE,
         kind=WHOLE,
+        rank=1,
     ),
     Column(
         "delay_deg",
@@ -301,10 +308,17 @@ BLOCKS = (
         ),
         lambda angle: f"{angle:.2f}",
         EVERYWHERE,
+        rank=3,
     ),
-    Column.named("width_s=block.width", "width", "s", to_figures(6), EVERYWHERE),
+    Column.named("width_s=block.width", Shared.ON_TIME, "s", to_figures(6), EVERYWHERE),
     Column(
-        "width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE
+        "width_counts",
+        Shared.ON_TIME,
+        "counts",
+        partial(_counts, "width"),
+        where=EVERYWHERE,
+        kind=WHOLE,
+        rank=2,
     ),
     Column.named("count=block.count", Shared.PULSES, "", where=EVERYWHERE, kind=WHOLE),
     Column.named("every=block.every", Shared.EVERY, "turn", where=EVERYWHERE, kind=WHOLE),
@@ -352,15 +366,22 @@ def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
     return replace(table, rows=rows)
 
 
-LINES = 40  # lines of a default screen
-WIDE, FEWEST = 160, 24  # columns where no cell is broken, and lines of the smallest screen there
-NOTES = 3  # notes on it, at most, besides warnings
+LINES = (40, 40)  # of a default screen, and of one narrower than `WIDTH`
+NOTES = 3  # on it, at most, warnings among them
+# rows before the last one, and notes: the first that fits
 SIZES = (
     (14, NOTES),
     (8, NOTES),
+    (6, NOTES),
     (4, NOTES),
+    (2, NOTES),
+    (4, 2),
+    (2, 2),
+    (1, 2),
+    (2, 1),
+    (1, 1),
     (1, 0),
-)  # rows before the last one, and notes: the first that fits
+)
 
 
 def opening(spacecraft: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
@@ -378,50 +399,114 @@ def summary(
     *,
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
+    lines: tuple[int, int] = LINES,
 ) -> RenderableType:
-    """A default screen, warnings below its ``head``, and ``steps`` to take next; ``table`` by its
-    ``first`` rows.
+    """A default screen of at most so many ``lines``: its ``head``, a ``table`` by its ``first``
+    rows, notes, and ``steps`` to take next.
 
     ``verbose``: with all rows and notes, and ``more`` parts.
     """
-    every = ordered(notes)
-    warnings = [screen_line(note) for note in every if severity(note) == WARNING]
-    others = [screen_line(note) for note in every if severity(note) != WARNING]
-    if verbose:
-        body = [Text(), table()] if table is not None else []
-        for part in more:
-            body += [Text(), part]
-        if others:
-            body += [Text(), *others]
-        return Group(*head, *warnings, *body)
-
-    def screen(rows: int, count: int) -> Group:
-        body = [Text(), table(first=rows)] if table is not None else []
-        if quiet():
-            return Group(*head, *warnings, *body)
-        if body:
-            body.append(Text())
-        hidden = f" ({len(others) - count} more)" if len(others) > count else ""
-        last = Text(f"-v all values{hidden} · {steps}", style="dim")
-        return Group(*head, *warnings, *body, *others[:count], last)
-
-    for size in SIZES[:-1]:
-        if lines_of(shown := screen(*size)) <= LINES:
-            return shown
-    shown = screen(*SIZES[-1])
-    if lines_of(shown, width=WIDE) <= FEWEST:
-        return shown
-    dense = [*_dense(shown)]
-    # Steps to take next are what is missed least.
-    return Group(*(dense if lines_of(Group(*dense), width=WIDE) <= FEWEST else dense[:-1]))
+    ranked = sorted(ordered(notes), key=rank)
+    if not verbose:
+        return DefaultScreen(head, table, ranked, steps.split(STEP), lines, silent=quiet())
+    body = [*head]
+    for part in (*([] if table is None else [table()]), *more):
+        body += [Text(), part]
+    return Group(*body, *([Text()] if ranked else []), *map(screen_line, ranked))
 
 
-def _dense(part: RenderableType) -> Iterator[RenderableType]:
-    """Parts of a group without the blank lines between them."""
+STEP = " · "  # between two steps to take next
+
+
+class Clauses:
+    """A line of text that is broken behind commas, where it does not fit and that takes no more
+    lines.
+    """
+
+    def __init__(self, line: Text) -> None:
+        self.line = line
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        width = options.max_width
+        lines = [Text()]
+        for clause in self.line.divide(mark.end() for mark in BREAK.finditer(self.line.plain)):
+            if lines[-1] and len(lines[-1]) + len(clause.plain.rstrip()) > width:
+                lines.append(Text())
+            lines[-1].append_text(clause)
+        whole = lines_of(Group(*lines), width=width) <= lines_of(self.line, width=width)
+        yield from lines if whole else [self.line]
+
+
+BREAK = re.compile("[,;:] ")  # where `Clauses` may be broken
+
+
+class DefaultScreen:
+    """A head, a table, notes in the order of what they change, and steps to take next: as many rows
+    and notes as the lines of a screen hold, which is measured when it is shown.
+    """
+
+    def __init__(
+        self,
+        head: Sequence[RenderableType],
+        table: Callable[..., RenderableType] | None,
+        notes: Sequence[Note],
+        steps: Sequence[str],
+        lines: tuple[int, int],
+        *,
+        silent: bool,
+    ) -> None:
+        self.head = [Clauses(part) if isinstance(part, Text) else part for part in head]
+        self.table, self.steps, self.silent = table, steps, silent
+        self.count, self.lines = len(notes), lines
+        self.notes = [screen_line(entry) for entry in notes if not is_detail(entry)]
+        self.warnings = min(sum(severity(entry) == WARNING for entry in notes), NOTES)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        width = options.max_width
+        most = self.lines[width < WIDTH]
+        sizes = [size for size in SIZES if size[1] >= self.warnings]
+        for make in (lambda parts: parts, _dense):
+            for rows, count in sizes:
+                shown = Group(*make(self._cut(rows, count, width)))
+                if lines_of(shown, width=width) <= most:
+                    yield shown
+                    return
+        yield shown
+
+    def _cut(self, rows: int, count: int, width: int) -> list[RenderableType]:
+        """Parts of the screen with so many rows before the last one, and so many notes."""
+        parts: list[RenderableType] = [*self.head]
+        if self.table is not None:
+            parts += [Text(), self.table(first=rows)]
+        parts = [*_parts(Group(*parts))]
+        for part in parts:
+            if isinstance(part, FittedColumns):
+                part.shortened = True
+        shown = self.notes[:count]
+        if shown and self.table is not None:
+            parts.append(Text())
+        if self.silent:
+            return [*parts, *shown]
+        hidden = self.count - len(shown)
+        last = "-v all values" + (f" ({hidden} more)" if hidden else "")
+        for step in self.steps:
+            if len(last) + len(STEP) + len(step) <= width:
+                last += STEP + step
+        return [*parts, *shown, Text(last, style="dim")]
+
+
+def _parts(part: RenderableType) -> Iterator[RenderableType]:
+    """Parts of a group, and of groups in it."""
     if isinstance(part, Group):
-        yield from (inner for each in part.renderables for inner in _dense(each))
-    elif not isinstance(part, Text) or part.plain:
+        for each in part.renderables:
+            yield from _parts(each)
+    else:
         yield part
+
+
+def _dense(parts: Iterable[RenderableType]) -> list[RenderableType]:
+    """Parts without blank lines between them."""
+    return [part for part in parts if not isinstance(part, Text) or part.plain]
 
 
 def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:

@@ -9,7 +9,7 @@ and in each ∫ω3 dt grows by 2π.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -49,6 +49,7 @@ from nutdamp.views.text import (
     degrees,
     longitude,
     moment,
+    ordered,
     pointing,
     screen_line,
     small_angle,
@@ -88,14 +89,15 @@ def _end_table(simulation: Simulation) -> DataTable:
     return DataTable("", columns, (simulation.impulses, simulation.flown))
 
 
-def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
-    """The screen of ``simulate``."""
+def simulation_screen(
+    simulation: Simulation, *, verbose: bool = True, planned: Sequence[Note] = ()
+) -> RenderableType:
+    """The screen of ``simulate``; ``planned``: notes on the plan that it flies."""
     judged, extremes = simulation.verdict, simulation.extremes
     spacecraft = simulation.flown.spacecraft
     pulses = simulation.flown.schedule
     fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
-    track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
-    headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
+    headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}")
     head = [
         *parts.opening(spacecraft, verbose),
         headline,
@@ -106,7 +108,7 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
     return parts.summary(
         head,
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
-        _notes(simulation),
+        [*_notes(simulation), *planned],
         "--csv track.csv · --plot motion.png · nutdamp verify",
         more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
@@ -164,7 +166,8 @@ def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
         yield around.heading, f"{west} to {east} deg in {frame}, from its axis x towards y"
         yield above.heading, _range(extremes.declination)
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
-    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
+    model = simulation.shown.model
+    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}, by the {model}"
 
 
 def _range(values: tuple[float, float]) -> str:
@@ -372,14 +375,18 @@ BUDGET_NOTE = (  # note on `budget_table`
 )
 
 
-def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
-    """The screen of ``verify``: verdict, methods, and what each imperfection leaves."""
+def verification_screen(
+    verified: Verified, *, verbose: bool, planned: Sequence[Note] = ()
+) -> RenderableType:
+    """The screen of ``verify``: verdict, methods, and what each imperfection leaves; ``planned``:
+    notes on the plan that it flies.
+    """
     plan, verification = verified.plan, verified.core
     spacecraft, judged = plan.spacecraft, plan.verdict
     confirmed = Light.GREEN if verification.agree else Light.RED
     lead, about = verdicts.headline(judged)
     head = [
-        parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion"),
+        parts.named(spacecraft, f": {plan.scheme}"),
         verdicts.coloured(verdict(verification), confirmed),
         Text.assemble((lead, verdicts.STYLES[judged.light]), about),
         verdicts.coloured(verdicts.statement(judged), judged.light),
@@ -395,9 +402,10 @@ def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
             *head,
             *(Text(), parts.derived_table(spacecraft)),
             *(Text(), methods),
-            *(Text(), *map(screen_line, (*missing, conservation(verification)))),
             *(Text(), Text(BUDGET, "bold"), Text()),
             *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
+            Text(),
+            *map(screen_line, ordered((*missing, conservation(verification), *planned))),
         )
     notes = [conservation(verification)]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
@@ -411,7 +419,9 @@ def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
     if worst is not None and worst.nutation - verification.budget[0].nutation > SHOWN:
         angle = math.degrees(worst.nutation)
         notes.append(note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
-    return parts.summary(head, lambda **_: methods, [*notes, *missing], "--json verified.json")
+    return parts.summary(
+        head, lambda **_: methods, [*notes, *missing, *planned], "--json verified.json"
+    )
 
 
 def verification_json(verified: Verified) -> dict[str, Any]:
@@ -435,19 +445,17 @@ def verification_json(verified: Verified) -> dict[str, Any]:
 
 
 def _difference(value: float) -> str:
-    if value == 0.0:
-        return "0"
-    return "< 1e-12" if value < 1e-12 else f"{value:.1e}"
+    return f"{value:.1e}" if value >= 1e-12 else "0"  # less is rounding
 
 
 NUTATION = Column.named("nutation_deg", Part.NUTATION.label, "deg", small_angle, "json screen")
 METHODS = (
     Column.named("name", "method", "", where="json screen", kind=TEXT),
     NUTATION,
-    Column.named("momentum_shift_deg", Part.SHIFT.label, "deg", small_angle, "json screen"),
+    Column.named("momentum_shift_deg", Part.SHIFT.label, "deg", small_angle, "json screen", rank=1),
     Column.named("axis_difference_rad=axis", "Δaxis", "rad", _difference, "json screen"),
     Column.named("momentum_difference_rad=momentum", "ΔH", "rad", _difference, "json screen"),
-    Column.named("rate_difference=rate", "Δrates", "relative", _difference, "json screen"),
+    Column.named("rate_difference=rate", "Δrates", "relative", _difference, "json screen", rank=2),
     Column.named("result_difference=result", "", "", where="json"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )

@@ -57,6 +57,9 @@ TRAIN, EVEN = 5, 0.05
 differ: the widths of their commands change as the nutation falls.
 """
 
+SHORTLY = {"why-single-pulses": "single pulses"}
+"""Words for reasons that are too long for a table."""
+
 FIGURES = 8  # of a value beside its limit, at most
 
 
@@ -206,7 +209,7 @@ def percent(share: float, *others: float) -> str:
     """
     distinct = [other for other in (*others, 0.0, 1.0) if other != share]
     for digits in range(1, 12):
-        shown = f"{100.0 * share:.{digits}f}"
+        shown = f"{100.0 * share:.{digits}f}" if share else "0"
         if all(float(shown) != float(f"{100.0 * other:.10g}") for other in distinct):
             return f"{shown} %"
     return f"{100.0 * share:.12g} %"
@@ -281,11 +284,17 @@ def bound_table(verdict: Verdict) -> DataTable:
         columns += [
             Column("", level, "", lambda line: value(line.bound, line.dispersed), where=where),
             Column(
-                "", "keep it", "", attrgetter("share"), lambda alone: percent(alone, share), where
+                "",
+                "keep it",
+                "",
+                attrgetter("share"),
+                lambda alone: percent(alone, share),
+                where,
+                rank=1,
             ),
         ]
     columns += [
-        Column("", "margin", "", margin, where=where),
+        Column("", "margin", "", margin, where=where, rank=2),
         Column("", "", "", line_word, where=where, kind=TEXT, met=attrgetter("met")),
     ]
     return DataTable("Requirement", columns, verdict.lines)
@@ -303,7 +312,7 @@ def scheme_word(compared: Comparison, plan: Plan) -> str:
         return "not found" if plan.found_none else "infeasible"
     why = compared.shortcoming(plan)
     if why is not None:
-        return text(why)
+        return SHORTLY.get(why.code) or text(why)
     verdict = compared.verdicts[plan]
     if verdict.required:
         return MET[True]
