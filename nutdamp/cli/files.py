@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from nutdamp.cli.job import (
     DEFAULT_FILE,
@@ -218,12 +217,10 @@ def schema_command(output: str) -> None:
     write_whole(output, json_text(json_schema()))
 
 
-def _topics(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Topics that begin so, with hyphens for blanks."""
-    from nutdamp.views.explain import names
+def _topics(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[str]:
+    from nutdamp.views.explain import completed
 
-    topics = sorted({name.replace(" ", "-") for name in names()})
-    return [CompletionItem(topic) for topic in topics if topic.startswith(begun)]
+    return completed(begun)
 
 
 # `-M1` may be a channel.

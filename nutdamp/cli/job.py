@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
-from click.shell_completion import CompletionItem
 
 from nutdamp.cli.main import QUIET, UNITS, in_context, look_of_screen, say, show, working, wrapped
 from nutdamp.cli.options import (
@@ -116,18 +115,10 @@ def _settings(
         raise click.BadParameter(str(wrong), ctx, param) from None
 
 
-def _keys(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Keys of the file that begin so; entries of lists, which are named in the file, are not."""
-    from nutdamp.views.explain import file_keys
+def _keys(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[str]:
+    from nutdamp.views.explain import completed_keys
 
-    keys = dict(file_keys())
-    lists = tuple(f"{path.removesuffix('.name')}." for path in keys if path.endswith(".name"))
-    shown = {path: text for path, text in keys.items() if not path.startswith(lists)}
-    return [
-        CompletionItem(f"{path}=", help=text)
-        for path, text in shown.items()
-        if path.startswith(begun)
-    ]
+    return completed_keys(begun)
 
 
 _CHANGE = "Change a key, e.g. limits.gap=1s; repeatable."

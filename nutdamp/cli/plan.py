@@ -207,12 +207,14 @@ def _certified(
 def _screen(
     compared: Comparison, dispersed: RobustComparison | None, verbose: bool, file: str
 ) -> RenderableType:
-    from nutdamp.views.glance import comparison_screen, glance
+    from nutdamp.views.glance import glance
+
+    if dispersed is None and not verbose:
+        return glance(compared, file=file)
+    from nutdamp.views.robust import comparison_screen, robust_notes, robust_screen
 
     if dispersed is None:
-        return comparison_screen(compared) if verbose else glance(compared, file=file)
-    from nutdamp.views.robust import robust_notes, robust_screen
-
+        return comparison_screen(compared)
     if verbose:
         return robust_screen(dispersed)
     return glance(dispersed.joined, robust_notes(dispersed), file=file)

@@ -103,6 +103,21 @@ def names() -> Iterator[str]:
     yield from (path for path, _ in file_keys())
 
 
+def completed(begun: str) -> list[str]:
+    """Names that begin so, with hyphens for blanks."""
+    hyphened = {name.replace(" ", "-") for name in names()}
+    return sorted(name for name in hyphened if name.startswith(begun))
+
+
+def completed_keys(begun: str) -> list[str]:
+    """Keys of the file that begin so, as ``--set`` takes them; entries of lists, which each file
+    names, are not.
+    """
+    keys = [path for path, _ in file_keys()]
+    lists = tuple(path.removesuffix("name") for path in keys if path.endswith(".name"))
+    return [f"{path}=" for path in keys if path.startswith(begun) and not path.startswith(lists)]
+
+
 def _folded(name: str) -> str:
     """Names in small letters with hyphens; a single letter, which is a symbol, as it is."""
     return re.sub(

@@ -21,7 +21,6 @@ from nutdamp.planning.notes import (
     alternatives,
     comparison_warnings,
     plan_notes,
-    reasons,
     spacecraft_notes,
     verdict_notes,
 )
@@ -46,11 +45,8 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     degrees,
     digits,
-    joined,
     moment,
     ordered,
-    screen_line,
-    sentence,
     short_angle,
     small_angle,
     text,
@@ -304,7 +300,7 @@ def glance(
     commands name it.
     """
     judged, plan = compared.verdict, compared.recommended
-    head = [*parts.title(compared.spacecraft), headline(compared)]
+    head = [parts.title(compared.spacecraft), headline(compared)]
     fired = None
     ending: list[RenderableType] = []
     if plan is not None:
@@ -332,7 +328,7 @@ LINES = (24, 30)  # of the screen, and of one narrower than 80 characters
 
 
 def steps(plan: Plan | None, file: str) -> Iterator[str]:
-    """What tells more about the plan to fly, or takes it further."""
+    """Next steps: commands and options that tell more of the plan to fly, or take it further."""
     blocks = plan is not None and bool(plan.pulses.blocks)
     channel = (
         next((pulse.channel for pulse in plan.pulses if pulse.channel != STEERABLE), "")
@@ -415,55 +411,3 @@ def _axis(plan: Plan) -> str:
         else f"; spin {final.spin * RPM:.5g} rpm"
     )
     return f"{axis} deg{spin}"
-
-
-def comparison_screen(compared: Comparison) -> RenderableType:
-    """All tables of ``plan``, the verdict on top."""
-    judged, chosen = compared.verdict, compared.recommended
-    schemes = scheme_table(compared, chosen).transposed("full")
-    results: list[RenderableType] = [
-        Text(),
-        parts.derived_table(compared.spacecraft),
-        Text(),
-        schemes,
-    ]
-    lead: list[RenderableType] = [parts.named(compared.spacecraft), headline(compared)]
-    general = map(screen_line, ordered(spacecraft_notes(compared.spacecraft)))
-    remarks = [note for plan in compared.plans for note in plan_notes(plan)]
-    results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
-    if chosen is None:
-        return Group(*lead, *general, *results)
-    pulses = chosen.pulses
-    if pulses.blocks:
-        results += [Text(), parts.blocks_screen(chosen.flight, chosen.delta_v)]
-    elif len(pulses):
-        totals: dict[str, float] = {}
-        for pulse in pulses:
-            totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
-        on_times = facts(
-            (f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items()
-        )
-        results += [Text(), parts.pulse_table(chosen.flight).screen("full"), Text(), on_times]
-    why = joined(reasons(compared))
-    warnings = comparison_warnings(compared, tabulated=True)
-    beside = [*warnings, *verdict_notes(judged, chosen), *alternatives(compared)]
-    return Group(
-        *lead,
-        Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]),
-        Text(sentence(f"{chosen.scheme}: {why}")),
-        *(
-            Text(
-                (
-                    f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, "
-                    f"{text(cheaper.why)}"
-                ),
-                "dim",
-            )
-            for cheaper in judged.cheaper
-        ),
-        *general,
-        *map(screen_line, ordered(beside)),
-        *(Text(), verdicts.bound_table(judged).screen("screen")),
-        *(Text(), end_facts(chosen)),
-        *results,
-    )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -35,6 +36,7 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions, parts, tables
 from nutdamp.views import verdict as verdicts
+from nutdamp.views.check import derived_table
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -143,14 +145,29 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     flight, schedule = simulation.shown, simulation.shown.schedule
     if schedule.blocks:
-        yield parts.blocks_screen(flight, simulation.plan.delta_v)
+        yield parts.block_table(flight).screen("screen")
     if len(schedule):
-        shown = parts.shown_rows(parts.pulse_table(flight), schedule)
+        shown = shown_rows(parts.pulse_table(flight), schedule)
         yield shown.screen("simulate")
         if len(shown.rows) < len(schedule):
             yield Text(
                 f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim"
             )
+
+
+# largest number of pulses of a block on a screen: the first, the last, and evenly some between
+EVENLY = 8
+
+
+def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
+    """The pulses that a screen shows: all, but of long blocks only some."""
+    shown = set[int]()
+    for own in schedule.pulses_by_block:
+        step = max(math.ceil((len(own) - 1) / (EVENLY - 1)), 1)
+        shown |= {*own[::step], own[-1]}
+    # a track may end before the last one
+    rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
+    return replace(table, rows=rows)
 
 
 def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
@@ -400,7 +417,7 @@ def verification_screen(
     if verbose:
         return Group(
             *head,
-            *(Text(), parts.derived_table(spacecraft)),
+            *(Text(), derived_table(spacecraft)),
             *(Text(), methods),
             *(Text(), Text(BUDGET, "bold"), Text()),
             *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),

@@ -187,6 +187,7 @@ INSTEAD = re.compile(r"\{(\w+)\} instead of \{(than_\1)\}")
 UNITS: dict[
     str, Callable[[float], str]
 ] = {  # texts of values by the end of their names, the first that fits
+    "limit_deg": lambda value: limit_text(math.radians(value)),
     "_deg": lambda value: degrees(math.radians(value)),
     "_rad_s": lambda value: quantity(value, "rad/s"),
     "lasting_s": lasting,

@@ -20,7 +20,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
-from nutdamp.views.tables import REAL, TEXT, Column, DataTable, FittedColumns, Shared, facts
+from nutdamp.views.tables import REAL, TEXT, Column, DataTable, FittedColumns, Shared
 from nutdamp.views.text import quantity
 
 SHOWN = {  # units for people of those of inputs, and the factor
@@ -172,12 +172,6 @@ def inputs_table(drawn: Sequence[DispersedInput], draws: Mapping[str, float]) ->
 def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
     """The unit of an input for people, and the factor to it."""
     return screen_unit(*SHOWN.get(entry.unit, (entry.unit, 1.0)))
-
-
-def unused_table(unused: Iterable[Unused]) -> list[RenderableType]:
-    """Inputs without effect under their heading; nothing where there are none."""
-    rows = list(without_effect(unused))
-    return [Text(), Text("Unused dispersions", style="bold"), facts(rows)] if rows else []
 
 
 def without_effect(unused: Iterable[Unused]) -> Iterator[tuple[str, str]]:

@@ -6,7 +6,6 @@ All screens, pages, figures and files take these; no other module has a word for
 from __future__ import annotations
 
 import math
-from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import Any
 
@@ -52,11 +51,6 @@ MET = {True: "met", False: "NOT met", None: MISSING}
 DAMPED = {Part.DISTANCE: "reached"}
 """Words for a bound that nobody requires; of others damped."""
 
-TRAIN, EVEN = 5, 0.05
-"""Pulses of one channel, at least, that are a train, and the share by which their distances may
-differ: the widths of their commands change as the nutation falls.
-"""
-
 SHORTLY = {"why-single-pulses": "single pulses"}
 """Words for reasons that are too long for a table."""
 
@@ -77,24 +71,10 @@ def spent(schedule: Schedule) -> str:
 
 
 def fired(schedule: Schedule) -> str:
-    """Number of pulses, of blocks and of trains; cost, and end of the last one."""
-    trains = []
-    single = 0
-    for channel, run in groupby(schedule, attrgetter("channel")):
-        del channel
-        times = [pulse.t for pulse in run]
-        gaps = [later - sooner for sooner, later in pairwise(times)]
-        if len(times) >= TRAIN and max(gaps) - min(gaps) <= EVEN * max(gaps):
-            trains.append(len(times))
-        else:
-            single += len(times)
-    if schedule.blocks or not trains:
-        count = f"pulses {len(schedule)}"
-    else:
-        counts = [f"train of {number}" for number in trains]
-        count = " and ".join([*counts, f"pulses {single}"] if single else counts)
+    """Number of blocks and pulses, cost, and end of the last one."""
     blocks = f"blocks {len(schedule.blocks)}, " if schedule.blocks else ""
-    return f"{blocks}{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
+    count = f"{blocks}pulses {len(schedule)}"
+    return f"{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
 
 
 def headline(verdict: Verdict, compared: Comparison | None = None) -> tuple[str, str]:

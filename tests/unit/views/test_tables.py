@@ -22,8 +22,8 @@ import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.units import US, screen_units
-from nutdamp.views.glance import glance
-from nutdamp.views.parts import FEWEST, LINES, SIZES, WIDE, block_table, pulse_table
+from nutdamp.views.glance import LINES, glance
+from nutdamp.views.parts import NOTES, SIZES, block_table, pulse_table
 from nutdamp.views.tables import REAL, TEXT, WHOLE, WIDTH, YES_NO, Column, DataTable, angle_of
 from nutdamp.views.text import short_angle, vector
 from nutdamp.views.verdict import HEADLINES
@@ -224,24 +224,28 @@ def compared(body: Spacecraft, *names: str) -> nutdamp.Comparison:
 @pytest.mark.usefixtures("plans_shared")
 @spread("name", NAMES, quick=2, deep=len(NAMES))
 def test_a_plan_is_seen_at_a_glance(name: str) -> None:
-    lines = glance_lines(compared(nutdamp.load(CONFIGS / f"{name}.yaml")))
-    assert len(lines) <= LINES
-    assert max(map(len, lines)) <= WIDTH
-    assert [line for line in lines if line.startswith((*HEADLINES.values(),))] == [lines[1]]
-    assert lines[-1].startswith("-v ")
-    assert lines[-1].endswith("nutdamp report")
-    assert not any("…" in line and "more" not in line for line in lines)
+    screen = glance(compared(nutdamp.load(CONFIGS / f"{name}.yaml")))
+    for width, most in ((60, LINES[1]), (WIDTH, LINES[0]), (120, LINES[0])):
+        lines = printed(screen, width)
+        assert len(lines) <= most
+        assert max(map(len, lines)) <= width
+        assert [line for line in lines if line.startswith((*HEADLINES.values(),))] == [lines[1]]
+        assert lines[-1].startswith("-v ")
+        assert sum(line.startswith(("note[", "warning[")) for line in lines) <= NOTES
+        assert not any("…" in line and "more" not in line for line in lines)
+        (table,) = (part for part in "\n".join(lines).split("\n\n") if "\none-pulse" in part)
+        assert re.match(r"(?: .*\n)?scheme .*verdict(\n\S+ .*\S)+", table), "a row is broken"
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize("name", ["plan-25-lines", "plan-30-lines"])
 def test_a_plan_of_many_bounds_and_warnings_fits_a_terminal(name: str) -> None:
-    """Where no cell is broken; of 80 columns it takes more."""
+    """Lines between its tables go before a warning does."""
     with pytest.warns(UserWarning, match="is read as") if "25" in name else nullcontext():
         body = nutdamp.load(case(f"{name}.yaml"))
-    compared = nutdamp.compare(body)
-    assert len(printed(glance(compared), WIDE)) <= FEWEST
-    assert len(printed(glance(compared), WIDTH)) <= LINES
+    lines = printed(glance(nutdamp.compare(body)), 160)
+    assert len(lines) <= LINES[0]
+    assert any(line.startswith("warning[") for line in lines)
 
 
 @pytest.mark.usefixtures("plans_shared")
