@@ -154,7 +154,7 @@ def animate_command(
     job: Job, until: float | None, seconds: float | None, fps: int, width: int
 ) -> None:
     """Film the body cone rolling on the space cone through the pulses, flown with their real
-    widths.
+    on-times.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example.
     A FILE of - is standard output, as GIF.
@@ -197,7 +197,7 @@ def animate_command(
     "--flown",
     "real",
     is_flag=True,
-    help="Propagate real pulse widths instead of the impulse sum (17).",
+    help="Propagate real on-times instead of the impulse sum (17).",
 )
 @click.option(
     "--until",

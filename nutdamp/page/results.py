@@ -228,7 +228,7 @@ def html(result: Spacecraft | Plan | Flight | Comparison | Simulation) -> str | 
 
 def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
     from nutdamp.page.document import FactList, Prose, facts_of, sheet
-    from nutdamp.views.check import derived_table
+    from nutdamp.views.decisions import derived_table
 
     if isinstance(result, Spacecraft):
         return facts_of(result.name, derived_table(result))

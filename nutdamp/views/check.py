@@ -5,14 +5,12 @@ two pulses.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-import numpy as np
 from rich.console import RenderableType
-from rich.table import Table
 
 from nutdamp import __version__
 from nutdamp.common.numerics import finite
@@ -26,28 +24,25 @@ from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.planning.notes import shift_notes, spacecraft_notes
-from nutdamp.planning.plan import NO_NUTATION
 from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.units import screen_unit
-from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
+from nutdamp.views.decisions import (
+    aspects_json,
+    derived_table,
+    direction_json,
+    spacecraft_json,
+)
 from nutdamp.views.guide import Topic
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.parts import (
-    aspect_facts,
-    changing,
     named,
-    required,
-    spin_text,
     summary,
-    target_text,
 )
 from nutdamp.views.tables import (
     TEXT,
     Column,
     DataTable,
     Shared,
-    facts,
     file_columns,
     to_figures,
     values_of,
@@ -128,80 +123,6 @@ def channel_topics(spacecraft: Spacecraft, name: str) -> Iterator[Topic]:
             ]
             text = "\n".join(f"- **{heading}**: {cell}" for heading, cell in rows)
             yield Topic(name, f"a channel of {named(spacecraft).plain}", text)
-
-
-def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
-    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
-    return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
-
-
-def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    inertia = spacecraft.inertia
-    motion = spacecraft.widest
-    moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
-    yield "inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}"
-    if not inertia.symmetric:
-        unit, factor = screen_unit("kg m²")
-        first, second, _ = factor * np.asarray(inertia.moments)
-        yield (
-            "",
-            f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; schemes but optimal plan on their mean",
-        )
-    if inertia.wheel:
-        whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
-        yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
-    reversed_ = ": the spin axis is body axis -3" if spacecraft.sense < 0.0 else ""
-    yield "spin", f"{spin_text(spacecraft.spin)}{reversed_}"
-    now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
-    cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
-    yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
-    period = spacecraft.motion_period
-    still = math.isinf(period)
-    in_body = (
-        "none in the body, where ω does not turn" if still else f"{duration(period)} in the body"
-    )
-    yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
-    if spacecraft.dissipation is not None:
-        yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
-    # Causes that break the floors A|ω0| and C|ω3|β.
-    unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
-    beyond = " and ".join([*unequal, *changing(spacecraft)])
-    floor = f"no least impulse with {beyond}" if beyond else "lower bound"
-    name = "impulse" if beyond else "least impulse"
-    yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
-    if spacecraft.goal.axis is not None:
-        symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
-        turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
-        turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
-        bound = "" if beyond else ", the least to turn H"
-        yield "target", target_text(spacecraft)
-        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{bound}"
-    if spacecraft.goal.spin is not None:
-        yield "final spin", spin_text(spacecraft.goal.spin)
-    actuators = []
-    torquer = spacecraft.torquer
-    if torquer is not None:
-        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
-        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
-        actuators.append(f"steerable torquer, {strength}{assumed}")
-    if spacecraft.channels:
-        actuators.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
-    yield "actuators", "; ".join(actuators)
-    bounds = required(spacecraft)
-    if bounds:
-        yield "requirement", bounds
-
-
-def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
-    """Effect of energy dissipation on the nutation,
-    and a note where it is too fast for its model.
-    """
-    if spacecraft.growth == 0.0:
-        return "none: a sphere has no energy to lose"
-    what = "grows" if spacecraft.growth > 0.0 else "decays"
-    slow = time_constant >= spacecraft.inertial_period
-    rough = "" if slow else "; less than one inertial period: results are rough"
-    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
 
 
 VALVES = (  # columns of pulses of valves that are alike
@@ -497,10 +418,10 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             if stepped is None
             else f"in steps of {duration(stepped)}, {widths[0]} to {widths[-1]}"
         )
-        yield "width", steps or listed(widths, "or")
+        yield Shared.ON_TIME, steps or listed(widths, "or")
         every = listed([str(count) for count in commands.every], "or")
         together = "; two in the same turns" if commands.per_turn > 1 else ""
-        counted = f"at most {commands.max_count} pulses; every: {every} of the spins"
+        counted = f"at most {commands.max_count} pulses; every: {every} of the turns"
         yield "block", f"{counted}{together}"
 
 

@@ -44,7 +44,7 @@ and their paragraph.
 ALIKE = ("glossary", "symbol")  # kinds whose names of one paragraph mean the same
 
 _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
-    r"([-,]+(N-m(-s)?|ft-lbf(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
+    r"([-,]+(N-m(-s)?|ft-lbf(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|counts|turn|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
 )
 
 
@@ -74,6 +74,8 @@ def explained(
                 return own
             if guide.NUMBER.fullmatch(requested.strip().casefold()):
                 raise
+            if passages := _passages(requested):
+                return Topic(requested, "where the guide has it", _listed(passages))
             near = guide.meant(nearest(wanted, guide.NAMES) or wanted, tuple(names()))
             raise BadRequest(f"there is no topic {requested!r}; {near}") from None
         if not texts and len(keys) == 1:
@@ -158,6 +160,20 @@ def _sections(wanted: str) -> Iterator[Topic]:
                 folded = _folded(title)
                 if folded == wanted or (begins and len(wanted) > 3 and folded.startswith(wanted)):
                     yield Topic(title, f"in explain {name}", text)
+
+
+PASSAGES = 6  # most passages shown of a word that is no topic: few are read to the end
+
+
+def _passages(requested: str) -> list[tuple[str, str]]:
+    """Entries and paragraphs of the guide that have the words ``requested``, and their names."""
+    word = re.compile(rf"(?<!\w){re.escape(requested.strip())}(?!\w)", re.IGNORECASE)
+    entries = [entry for _, source in WORDS for entry in source()]
+    pages = ((name, guide.page_or_topic(name).text) for name in guide.NAMES)
+    for name, page in pages:
+        entries += [(name, text) for text in re.split(r"\n\n|\n(?=- )", page)]
+    plain = ((name, " ".join(text.split())) for name, text in (*entries, *file_keys()))
+    return [entry for entry in plain if word.search(": ".join(entry))][:PASSAGES]
 
 
 def file_keys() -> Iterator[tuple[str, str]]:

@@ -29,8 +29,8 @@ from nutdamp.estimation.results import (
 from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
-from nutdamp.views.decisions import heading
-from nutdamp.views.parts import direction_columns, opening, summary
+from nutdamp.views.decisions import heading, opening
+from nutdamp.views.parts import direction_columns, summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
 from nutdamp.views.text import fixed, note_json
 

@@ -12,7 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.common.numerics import RPM
+from nutdamp.common.numerics import MISSING, RPM
 from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
 from nutdamp.flight.propagation import REAL_WIDTHS, Flight, model_name
@@ -393,7 +393,7 @@ def ends(plan: Plan) -> Table:
 
 
 def axis_line(plan: Plan) -> Text:
-    """Where the spin axis points after the pulses, and what changes it then."""
+    """Direction of the spin axis after the pulses, and what changes it then."""
     later = lasting(plan.flight) if len(plan.pulses) else ""
     return Text.assemble(("axis  ", "dim"), _axis(plan), f" {later}" if later else "")
 
@@ -404,10 +404,12 @@ def _axis(plan: Plan) -> str:
         (SHORT_NAMES.get(column.heading, column.heading), column.shown(final.axis))
         for column in parts.direction_columns(spacecraft)
     ]
-    axis = ", ".join(f"{name} {angle}" for name, angle in angles)
+    axis = ", ".join(f"{name} {angle}" for name, angle in angles) + " deg"
+    if MISSING in axis:
+        axis = "along H of t = 0"
     spin = (
         ""
         if requirements.spins_at(spacecraft, final.spin)
         else f"; spin {final.spin * RPM:.5g} rpm"
     )
-    return f"{axis} deg{spin}"
+    return f"{axis}{spin}"

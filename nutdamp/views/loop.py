@@ -27,8 +27,8 @@ from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, tables
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.decisions import heading
-from nutdamp.views.parts import opening, pulse_table, seconds, summary
+from nutdamp.views.decisions import heading, opening
+from nutdamp.views.parts import pulse_table, seconds, summary
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,

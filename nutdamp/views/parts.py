@@ -361,16 +361,6 @@ SIZES = (
 )
 
 
-def opening(spacecraft: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
-    """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
-    if not verbose:
-        yield title(spacecraft)
-        return
-    from nutdamp.views.check import derived_table  # asked for all values
-
-    yield from (named(spacecraft), derived_table(spacecraft), Text())
-
-
 def summary(
     head: Sequence[RenderableType],
     table: Callable[..., RenderableType] | None,

@@ -26,8 +26,7 @@ from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reason
 from nutdamp.planning.screening import FlownPlan
 from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.check import derived_table
-from nutdamp.views.decisions import final_json, plan_json, target_json
+from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
 from nutdamp.views.glance import end_facts, headline, scheme_table
 from nutdamp.views.parts import block_table, named, pulse_table
 from nutdamp.views.tables import (

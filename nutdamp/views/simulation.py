@@ -36,7 +36,6 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions, parts, tables
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.check import derived_table
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -101,7 +100,7 @@ def simulation_screen(
     fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}")
     head = [
-        *parts.opening(spacecraft, verbose),
+        *decisions.opening(spacecraft, verbose),
         headline,
         verdicts.coloured(*verdicts.stated(judged)),
     ]
@@ -298,7 +297,7 @@ def spin_table(spacecraft: Spacecraft, schedule: Schedule, until: float) -> str:
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
     if last * abs(spacecraft.spin) > 2.0 * math.pi * MOST_SPINS:
         raise BadRequest(
-            f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)"
+            f"the table would have more than {MOST_SPINS} turns; choose an earlier end (until)"
         )
     first, begins = _begins(spacecraft, schedule, last)
     fired: dict[int, list[Pulse]] = {}
@@ -325,7 +324,7 @@ def _begins(spacecraft: Spacecraft, schedule: Schedule, last: float) -> tuple[in
     from nutdamp.schemes.block_model import spin_turn, sun_pulses
 
     if spacecraft.spin == 0.0:
-        raise BadRequest("a table of spins needs a body that spins")
+        raise BadRequest("a table of turns needs a body that spins")
     turn = spin_turn(spacecraft)
     until = last + 3.0 * turn
     for _ in range(2):  # where the spin falls, turns get longer
@@ -417,7 +416,7 @@ def verification_screen(
     if verbose:
         return Group(
             *head,
-            *(Text(), derived_table(spacecraft)),
+            *(Text(), decisions.derived_table(spacecraft)),
             *(Text(), methods),
             *(Text(), Text(BUDGET, "bold"), Text()),
             *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
@@ -477,7 +476,14 @@ METHODS = (
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )
 IMPERFECTIONS = (
-    Column.named("imperfection=name", "imperfection", "", where="json screen", kind=TEXT),
+    Column.named(
+        "imperfection=name",
+        "imperfection",
+        "",
+        where="json screen",
+        kind=TEXT,
+        words=lambda row: row.name.replace("pulse width", Shared.ON_TIME),
+    ),
     NUTATION,
     *tables.file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",

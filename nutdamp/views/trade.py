@@ -25,8 +25,7 @@ from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.check import derived_table
-from nutdamp.views.decisions import heading, plan_json
+from nutdamp.views.decisions import derived_table, heading, plan_json
 from nutdamp.views.parts import named, pulse_table, requested, summary
 from nutdamp.views.tables import (
     TEXT,

@@ -355,7 +355,7 @@ def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
 
 def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run) -> None:
     ended = run("simulate", status=0)
-    assert "using recommended plan: two-pulse\n" in ended.stderr
+    assert "SIMULATED two-pulse" in ended.stdout
     assert ended.stdout == run("simulate", "--scheme", "two-pulse").stdout
 
 

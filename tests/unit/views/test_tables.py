@@ -8,6 +8,7 @@ import math
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from operator import itemgetter
 from types import SimpleNamespace as Row
 
 import numpy as np
@@ -123,8 +124,8 @@ def test_an_array_has_the_fields_of_the_file() -> None:
 
 
 def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
-    heads, units, *rows = screen(TABLE)
-    assert [heads, units] == [["size"], ["name", "count", "mm", "verdict"]]
+    heads, *rows = screen(TABLE)
+    assert heads == ["name", "count", "size", "mm", "verdict"]
     assert rows == [
         ["one", "1", "500.0", "met"],
         ["two", "2", "–", "–"],
@@ -132,17 +133,45 @@ def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
     ]
 
 
-def test_below_60_columns_each_row_is_a_block_of_what_is_known() -> None:
-    name = TABLE.screen("screen").columns[0].header
-    values = ["count", "size,", "verdict"]
-    assert [line[0] for line in screen(TABLE, width=59)] == [
-        name,
-        *values,
-        name,
-        "count",
-        name,
-        *values,
-    ]
+RANKED = DataTable(
+    "",
+    [
+        Column("", name, "", itemgetter(at), kind=TEXT, where="screen", rank=rank)
+        for at, (name, rank) in enumerate(
+            [("scheme", 0), ("pulses", 3), ("end s", 1), ("nutation left", 0), ("shift", 2)]
+        )
+    ],
+    [("one-pulse", "2", "33.89", "0.00313", "0.269"), ("two-pulse", "2", "820.7", "0.00519", "0")],
+)
+
+
+@pytest.mark.parametrize(
+    ("width", "heads"),
+    [
+        (60, [["scheme", "pulses", "end", "s", "nutation", "left", "shift"]]),
+        (42, [["scheme", "pulses", "end", "s", "nutation", "left", "shift"]]),
+        (40, [["nutation"], ["scheme", "pulses", "end", "s", "left", "shift"]]),
+        (33, [["nutation"], ["scheme", "end", "s", "left", "shift"]]),
+        (26, [["nutation"], ["scheme", "end", "s", "left"]]),
+        (18, [["nutation"], ["scheme", "left"]]),
+    ],
+)
+def test_columns_of_a_default_screen_go_by_their_rank(width: int, heads: list[list[str]]) -> None:
+    """The gap narrows, then headings take two lines, then the largest rank goes; never a row."""
+    table = RANKED.screen("screen")
+    table.shortened = True
+    lines = [line.split() for line in printed(table, width)]
+    assert lines[:-2] == heads
+    assert [line[0] for line in lines[-2:]] == ["one-pulse", "two-pulse"]
+
+
+def test_without_a_rank_columns_go_on_below_and_nothing_is_lost() -> None:
+    for width in (18, 24, 30):
+        lines = printed(RANKED.screen("screen"), width)
+        assert max(map(len, lines)) <= width
+        assert sum(line.startswith("one-pulse") for line in lines) > 1
+        words = {word for line in lines for word in line.split()}
+        assert words >= {text for row in RANKED.rows for text in row}
 
 
 def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_room() -> None:
@@ -199,13 +228,15 @@ def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
     )
     files = table.csv(), table.json()
     assert screen(table) == [
-        ["mass", "torque"],
-        ["kg", "N", "m"],
+        ["mass", "kg", "torque", "N", "m"],
         ["0.4536", "(1.356,", "0,", "-2.712)"],
         ["–", "–"],
     ]
     with screen_units(US):
-        assert screen(table)[1:3] == [["lbm", "ft", "lbf"], ["1.0000", "(1,", "0,", "-2)"]]
+        assert screen(table)[:2] == [
+            ["mass", "lbm", "torque", "ft", "lbf"],
+            ["1.0000", "(1,", "0,", "-2)"],
+        ]
         assert [heading.unit for heading in table.headings("screen")] == ["lbm", "ft lbf"]
         assert (table.csv(), table.json()) == files
 
@@ -279,7 +310,7 @@ def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
     assert count > most + 1
     rows = glance_lines(plan)
     start = next(index for index, line in enumerate(rows) if line.startswith("pulse"))
-    first = [row.split()[0] for row in rows[start + 1 : start + most + 3]]
+    first = [row.split()[0] for row in rows[start + 1 : rows.index("", start)]]
     shown = first.index("…")
     assert first[: shown + 2] == [*map(str, range(1, shown + 1)), "…", str(count)]
     assert f"{count - shown - 1} more" in rows[start + shown + 1]
