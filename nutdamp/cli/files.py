@@ -232,8 +232,8 @@ def explain_command(topic: tuple[str, ...]) -> None:
 
     TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word
     such as `tilt`, `H` or `on_time_s`; `file.thrusters`; a channel such as `+M2` of the file
-    SPACECRAFT, else of spacecraft.yaml here or the built-in example; any other word of a screen. Without it the pages are
-    listed. On a terminal long pages go through a pager.
+    SPACECRAFT, else of spacecraft.yaml here or the built-in example; any other word of
+    a screen. Without it the pages are listed. On a terminal long pages go through a pager.
     """
     from nutdamp.views import explain
 

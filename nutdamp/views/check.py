@@ -57,7 +57,7 @@ from nutdamp.views.text import (
     small_angle,
     vector,
 )
-from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
+from nutdamp.views.tolerances import correlation_json, in_words, size_text, unused_notes
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
@@ -332,8 +332,7 @@ def _notes(spacecraft: Spacecraft, *, verbose: bool) -> Iterator[Note]:
         yield note("dates-end", horizon_s=spacecraft.horizon)
     if clock is not None and clock.refusal:
         yield note("no-sun-pulse", why=clock.refusal)
-    for names, reason in without_effect(() if dispersions is None else reachable(spacecraft)[1]):
-        yield note("dispersions-unused", dispersions=names, why=reason)
+    yield from unused_notes(() if dispersions is None else reachable(spacecraft)[1])
     idle = [channel.name for channel in spacecraft.channels if not channel.damps]
     if idle:
         yield note("never-damping", channels=", ".join(idle))

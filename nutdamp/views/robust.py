@@ -28,7 +28,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
 from nutdamp.views.glance import end_facts, headline, scheme_table
-from nutdamp.views.parts import block_table, named, pulse_table
+from nutdamp.views.parts import named, pulse_table
+from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
     TEXT,
     Column,
@@ -73,7 +74,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     tables.append(derived_table(compared.spacecraft))
     tables.append(scheme_table(compared, chosen).transposed("full"))
     if chosen is not None and chosen.pulses.blocks:
-        tables.append(block_table(chosen.flight).screen("screen"))
+        tables.append(Group(*blocks_screen(chosen)))
     elif chosen is not None and len(chosen.pulses):
         totals: dict[str, float] = {}
         for pulse in chosen.pulses:

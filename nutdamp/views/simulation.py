@@ -27,8 +27,9 @@ from nutdamp.flight.cones import aspects
 from nutdamp.flight.end_state import LEGENDRE
 from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
-from nutdamp.physics.attitude import full_turn
+from nutdamp.physics.attitude import angle_between, full_turn
 from nutdamp.planning.notes import TELLING, verdict_notes
+from nutdamp.planning.plan import Plan
 from nutdamp.planning.simulation import Simulation, Verified, model_warnings
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -49,9 +50,11 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     degrees,
     longitude,
+    mass,
     moment,
     ordered,
     pointing,
+    quantity,
     screen_line,
     small_angle,
 )
@@ -144,7 +147,7 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     flight, schedule = simulation.shown, simulation.shown.schedule
     if schedule.blocks:
-        yield parts.block_table(flight).screen("screen")
+        yield from blocks_screen(simulation.plan)
     if len(schedule):
         shown = shown_rows(parts.pulse_table(flight), schedule)
         yield shown.screen("simulate")
@@ -152,6 +155,32 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
             yield Text(
                 f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim"
             )
+
+
+def blocks_screen(plan: Plan) -> Iterator[RenderableType]:
+    """The command blocks of a plan, and what an operator compares before and after them."""
+    table = parts.block_table(plan.flight)
+    yield Text(table.title, style="bold")
+    yield table.screen("screen")
+    yield Text()
+    yield facts(_effects(plan))
+
+
+def _effects(plan: Plan) -> Iterator[tuple[str, str]]:
+    spacecraft, final = plan.spacecraft, plan.flight.final
+    for column in parts.direction_columns(spacecraft):
+        begin, end = map(column.worded, (spacecraft.momentum, final.momentum))
+        yield f"H: {column.heading}", f"{begin} to {end}"
+    if spacecraft.sun is not None:
+        sides = (spacecraft.momentum, final.momentum)
+        angles = (degrees(float(angle_between(side, spacecraft.sun))) for side in sides)
+        yield "Sun angle of H", " to ".join(angles)
+    yield Shared.SPIN, f"{parts.spin_text(spacecraft.spin)} to {parts.spin_text(final.spin)}"
+    used, tank = plan.pulses.propellant, spacecraft.tank
+    left = "" if used is None or tank is None else f"; {mass(tank.propellant - used)} left"
+    yield Shared.PROPELLANT, f"{verdicts.spent(plan.pulses)}{left}"
+    if plan.delta_v is not None:
+        yield "|ΔV|", quantity(float(np.linalg.norm(plan.delta_v)), "m/s")
 
 
 # largest number of pulses of a block on a screen: the first, the last, and evenly some between
