@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from itertools import islice
 from typing import ClassVar
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -21,13 +23,16 @@ from nutdamp.views import guide
 from nutdamp.views.guide import Topic
 
 
-def _notes() -> Iterator[tuple[str, str]]:
+@cache
+def _notes() -> list[tuple[str, str]]:
+    notes = []
     for heading, entry in guide.page("notes").sections[1:]:
         words = " ".join(entry.replace("\n> ", " ").split()).removeprefix("> ")
         shown = re.sub(
             r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", words
         )
-        yield heading.partition(" (")[0], shown
+        notes.append((heading.partition(" (")[0], shown))
+    return notes
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
@@ -120,6 +125,7 @@ def completed_keys(begun: str) -> list[str]:
     return [f"{path}=" for path in keys if path.startswith(begun) and not path.startswith(lists)]
 
 
+@cache
 def _folded(name: str) -> str:
     """Names in small letters with hyphens; a single letter, which is a symbol, as it is."""
     return re.sub(
@@ -127,6 +133,7 @@ def _folded(name: str) -> str:
     )
 
 
+@cache
 def _bare(name: str) -> str:
     """A name as `_folded`, without the unit at its end."""
     hyphened = re.sub(r"[\s_]+", "-", name.strip())
@@ -167,13 +174,21 @@ PASSAGES = 6  # most passages shown of a word that is no topic: few are read to 
 
 def _passages(requested: str) -> list[tuple[str, str]]:
     """Entries and paragraphs of the guide that have the words ``requested``, and their names."""
-    word = re.compile(rf"(?<!\w){re.escape(requested.strip())}(?!\w)", re.IGNORECASE)
+    wanted = requested.strip().casefold()
+    word = re.compile(rf"(?<!\w){re.escape(wanted)}(?!\w)")
+    having = (entry for entry, folded in _guide() if wanted in folded and word.search(folded))
+    return [*islice(having, PASSAGES)]
+
+
+@cache
+def _guide() -> list[tuple[tuple[str, str], str]]:
+    """Names and texts of entries and paragraphs, and both folded to small letters."""
     entries = [entry for _, source in WORDS for entry in source()]
     pages = ((name, guide.page_or_topic(name).text) for name in guide.NAMES)
     for name, page in pages:
         entries += [(name, text) for text in re.split(r"\n\n|\n(?=- )", page)]
     plain = ((name, " ".join(text.split())) for name, text in (*entries, *file_keys()))
-    return [entry for entry in plain if word.search(": ".join(entry))][:PASSAGES]
+    return [(entry, ": ".join(entry).casefold()) for entry in plain]
 
 
 def file_keys() -> Iterator[tuple[str, str]]:
