@@ -469,9 +469,12 @@ RARE = {
     "issue",
     "author",
     "date",
+    "units",
+    "threads",
+    "worst",
 }
 """Options that few need: where there are many of them the first help page leaves these out."""
-COMMON = {"free_axis", "shift"}
+COMMON = {"free_axis", "shift", "least"}
 """Options of schemes that notes and figures propose."""
 
 
