@@ -229,20 +229,8 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named += [
         entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named
     ]
-    rest = len(robust.candidates) - len(named)
-    level = exact_percent(robust.probability)
-    free = robust.comparison.spacecraft.goal.axis is None
-    residual = "nutation" if free else "nutation or axis error"
-    notes = [] if not rest else [f"Plans that rank below these: {rest}."]
-    if any(not entry.final for entry in robust.candidates):
-        notes.append("Losing plans stopped early.")
-    notes.append(
-        f"nominal, {level}: the {residual} left with nominal values, "
-        "and not exceeded in so many cases."
-    )
-    if robust.usual is not None:
-        notes.append("* is recommended without --robust.")
-    return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
+    below = f"Plans below these: {len(robust.candidates) - len(named)}; * without --robust."
+    return [_table(robust, named).screen("full"), Text(below, style="dim")]
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:

@@ -49,11 +49,9 @@ from nutdamp.views.tables import (
 )
 from nutdamp.views.text import (
     degrees,
-    longitude,
     mass,
     moment,
     ordered,
-    pointing,
     quantity,
     screen_line,
     small_angle,
@@ -199,25 +197,10 @@ def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
 
 
 def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
-    extremes, spacecraft = simulation.extremes, simulation.shown.spacecraft
-    yield (
-        "spin axis in x, in y",
-        f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame",
-    )
-    if spacecraft.attitude is not None:
-        frame = spacecraft.attitude.frame or "the frame of the file"
-        around, above = parts.direction_columns(spacecraft)
-        west, east = (longitude(math.degrees(angle)) for angle in extremes.right_ascension)
-        yield around.heading, f"{west} to {east} deg in {frame}, from its axis x towards y"
-        yield above.heading, _range(extremes.declination)
+    extremes = simulation.extremes
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
     model = simulation.shown.model
     yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}, by the {model}"
-
-
-def _range(values: tuple[float, float]) -> str:
-    low, high = (pointing(math.degrees(angle)) for angle in values)
-    return f"{low} to {high} deg"
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
