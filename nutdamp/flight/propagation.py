@@ -91,7 +91,7 @@ def even_times(
 
 
 IMPULSE_SUM = "impulse sum (17)"
-REAL_WIDTHS = "real on-times"  # models of the flight of a schedule
+REAL_WIDTHS = "real pulse widths"  # models of the flight of a schedule
 IDEAL_IMPULSES = (
     "exact motion, ideal impulses"  # name of the second model for people where no pulse has a width
 )
