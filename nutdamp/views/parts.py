@@ -452,7 +452,7 @@ class DefaultScreen:
         for part in parts:
             if isinstance(part, FittedColumns):
                 part.shortened = True
-        shown = self.notes[:count]
+        shown = self.notes if self.silent else self.notes[:count]
         if shown and self.table is not None:
             parts.append(Text())
         if self.silent:
