@@ -6,6 +6,8 @@ import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -149,11 +151,11 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
             say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
         leave(failed=not comparison.agree)
         return
-    plan = plan_or_read(job)
+    plan = plan_or_read(job, judged=True)
     with job.working("verifying"):
         verified = verify(plan)
     core = verified.core
-    job.deliver(verified, verbose=verbose)
+    job.deliver(verified, verbose=verbose, planned=job.planned)
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
@@ -216,23 +218,32 @@ def schema_command(output: str) -> None:
     write_whole(output, json_text(json_schema()))
 
 
-@click.command("explain")
-@click.argument("topic", nargs=-1, metavar="[TOPIC]")
+def _topics(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[str]:
+    from nutdamp.views.explain import completed
+
+    return completed(begun)
+
+
+# `-M1` may be a channel.
+@click.command("explain", context_settings={"ignore_unknown_options": True})
+@click.argument("topic", nargs=-1, metavar="[TOPIC] [SPACECRAFT]", shell_complete=_topics)
 def explain_command(topic: tuple[str, ...]) -> None:
     """Explain a page of the guide, a scheme, an equation, a word of a screen, or a key of the
     spacecraft file.
 
     TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word
-    such as `tilt`, `H` or `on_time_s`; `file.thrusters`; a channel of spacecraft.yaml here, else
-    of the built-in example. Without it the pages are listed. On a
-    terminal long pages go through a pager.
+    such as `tilt`, `H` or `on_time_s`; `file.thrusters`; a channel such as `+M2` of the file
+    SPACECRAFT, else of spacecraft.yaml here or the built-in example; any other word of
+    a screen. Without it the pages are listed. On a terminal long pages go through a pager.
     """
     from nutdamp.views import explain
 
-    requested = " ".join(topic).strip()
+    *words, last = topic or ("",)
+    file = last if words and Path(last).is_file() else None
+    requested = " ".join(words if file else topic).strip()
     shown = console()
     screen = (
-        explain.topic_screen(explain.explained(requested, _channels))
+        explain.topic_screen(explain.explained(requested, partial(_channels, file)))
         if requested
         else explain.topics_screen()
     )
@@ -245,16 +256,18 @@ def explain_command(topic: tuple[str, ...]) -> None:
     show(screen)
 
 
-def _channels(name: str) -> Iterator[Topic]:
-    """Channels of that ``name`` of the default file, or of the built-in example where there is
-    none without fault.
+def _channels(file: str | None, name: str) -> Iterator[Topic]:
+    """Channels of that ``name`` of a file, else of the default file, or of the built-in example
+    where there is none without fault.
     """
     from nutdamp.api import example
     from nutdamp.views.check import channel_topics
 
     try:
-        spacecraft = FileInput(None).source(lambda _: None, lambda _: None).read()
+        spacecraft = FileInput(file).source(lambda _: None, lambda _: None).read()
     except NutdampError:
+        if file is not None:
+            raise
         spacecraft = example()
     return channel_topics(spacecraft, name)
 

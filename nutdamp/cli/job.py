@@ -16,13 +16,14 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.main import QUIET, UNITS, in_context, look_of_screen, say, show, working
+from nutdamp.cli.main import QUIET, UNITS, in_context, look_of_screen, say, show, working, wrapped
 from nutdamp.cli.options import (
     END,
     FILE,
     GOAL,
     NO_SUN,
     OUTPUT,
+    SCHEME,
     WIDEST,
     Aim,
     Command,
@@ -114,9 +115,21 @@ def _settings(
         raise click.BadParameter(str(wrong), ctx, param) from None
 
 
+def _keys(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[str]:
+    from nutdamp.views.explain import completed_keys
+
+    return completed_keys(begun)
+
+
 _CHANGE = "Change a key, e.g. limits.gap=1s; repeatable."
 set_option = click.option(
-    "--set", "settings", multiple=True, metavar="KEY=VALUE", callback=_settings, help=_CHANGE
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=_settings,
+    help=_CHANGE,
+    shell_complete=_keys,
 )
 
 
@@ -235,7 +248,7 @@ class FlownChoice(NamedTuple):
 @dataclass
 class Job:
     """Request of a command line, and once `begun` the ``spacecraft``, its ``source``, and
-    ``silent``: no screens.
+    ``silent``: no screens; ``planned``: notes on the plan that it flies.
 
     ``read``, ``written``: files; ``figure``: the picture of ``plot``, None for the only one;
     ``usual``: its default.
@@ -254,6 +267,7 @@ class Job:
     source: Source = field(init=False)
     silent: bool = field(init=False)
     begun: bool = field(init=False, default=False)
+    planned: list[Note] = field(init=False, default_factory=list)
 
     def begin(self, folder: Iterable[str] = ()) -> Spacecraft:
         """Check the files of the command line, those that go to a ``folder`` too, and load its
@@ -292,11 +306,12 @@ class Job:
 
     def note(self, notes: Iterable[Note]) -> None:
         """Print notes on results on standard error; where quiet the warnings among them."""
-        from nutdamp.views.text import ordered, screen_line
+        from nutdamp.views.text import is_detail, ordered, rank, screen_line
 
         with look_of_screen():
-            for entry in ordered(notes):
-                say(screen_line(entry).plain)
+            for entry in sorted(ordered(notes), key=rank):
+                if not is_detail(entry):
+                    say(wrapped(screen_line(entry).plain))
 
     def doubt(self, *warnings: str) -> None:
         """Print warnings about the data on standard error, quiet or not."""
@@ -343,13 +358,15 @@ class Job:
         files: Sequence[Output] = (),
         unsaved: Sequence[CannotWrite | None] = (),
         verbose: bool | None = None,
+        planned: Sequence[Note] | None = None,
         **shown: Any,
     ) -> None:
         """Write the files that are requested of a result, and show it, unless a file goes to
         standard output.
 
         What ``more`` and ``screens`` lack the views of the result make, with the options ``shown``,
-        the screen ``verbose`` or not where it can be; see `deliver`.
+        the screen ``verbose`` or not, and with the notes ``planned``, where it can be; see
+        `deliver`.
         """
         from nutdamp.common import results
 
@@ -361,7 +378,8 @@ class Job:
                     results.view, result, what, *names, **shown if what == "data" else {}
                 )
         outputs = [(self.written.get(option), make) for option, make in contents.items()]
-        look = shown if verbose is None else {**shown, "verbose": verbose}
+        look = {**shown, "verbose": verbose, "planned": planned}
+        look = {name: value for name, value in look.items() if value is not None}
         usual = screens or (partial(results.view, result, "screen", **look),)
         failures = [wrong for wrong in unsaved if wrong is not None]
         deliver([*outputs, *files], *usual * (not self.silent), unsaved=failures)
@@ -422,8 +440,9 @@ def deliver(
                 write_whole(path, content)
             except CannotWrite as wrong:
                 failures.append(wrong)
-    for result in shown:
-        show(result)
+    with look_of_screen():
+        for result in shown:
+            show(result)
     for failure in failures[:-1]:
         say(f"nutdamp: {failure}")
     if failures:
@@ -442,6 +461,56 @@ def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]],
     return rendered(content, path)
 
 
+OPTIONS, WRITTEN, SCREEN = "Options", "Files to write", "Screen"  # headings of a help page
+FIRST_PAGE = 20  # options on the first help page, at most
+HELP_ALL = "nutdamp.help_all"  # key in the context of a command line
+RARE = {
+    "timed",
+    "table",
+    "certificate",
+    "at",
+    "figure",
+    "sun",
+    "title",
+    "document",
+    "issue",
+    "author",
+    "date",
+    "units",
+    "threads",
+    "worst",
+}
+"""Options that few need: where there are many of them the first help page leaves these out."""
+COMMON = {"free_axis", "shift", "least"}
+"""Options of schemes that notes and figures propose."""
+
+
+def _show_all(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
+    if asked and not ctx.resilient_parsing:
+        ctx.meta[HELP_ALL] = True
+        click.echo(ctx.get_help())
+        ctx.exit()
+
+
+help_all = click.Option(
+    ["--help-all"],
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_all,
+    help="Show this message with rare options too.",
+)
+
+
+def _heading(option: click.Option) -> str:
+    """Heading of an option on the help page."""
+    if option.is_eager or option.name in ("units", "verbose", "quiet"):
+        return SCREEN
+    if isinstance(option.type, OutputName) or option.name == "figure":
+        return WRITTEN
+    return str(getattr(option, "group", OPTIONS))
+
+
 class SessionCommand(click.Command):
     """A command whose help page has headings; shared parameters are gathered into ``job``."""
 
@@ -456,17 +525,35 @@ class SessionCommand(click.Command):
             job.refuse(reason)
             raise
 
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """The parameters, with ``--help-all`` where the first help page leaves some out."""
+        params = super().get_params(ctx)
+        return [*params, help_all] if self.rare() else params
+
+    def rare(self) -> set[str]:
+        """Names of options that the first help page leaves out: none where they are few."""
+        options = [param for param in self.params if isinstance(param, click.Option)]
+        if len(options) < FIRST_PAGE:
+            return set()
+        schemes = {
+            param.name for param in options if getattr(param, "group", "").startswith(SCHEME)
+        }
+        return {str(param.name) for param in options if param.name in RARE | schemes - COMMON}
+
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The options under their headings, those without one first."""
-        groups: dict[str, list[tuple[str, str]]] = {"Options": [], GOAL: []}
+        """The options under their headings, rare ones only with ``--help-all``."""
+        groups: dict[str, list[tuple[str, str]]] = {OPTIONS: [], GOAL: [], WRITTEN: [], SCREEN: []}
+        hidden = set() if ctx.meta.get(HELP_ALL) else self.rare()
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx)
+            if parameter.name in hidden:
+                continue
             if record is not None and isinstance(parameter, click.Option):
-                groups.setdefault(getattr(parameter, "group", "Options"), []).append(record)
+                groups.setdefault(_heading(parameter), []).append(record)
         for heading, records in groups.items():
             if records:
                 with formatter.section(heading):
-                    formatter.write_dl(records, col_max=WIDEST if groups[GOAL] else 30)
+                    formatter.write_dl(records, col_max=WIDEST)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse as click does; an option of a scheme that is not taken has its own error."""

@@ -150,6 +150,13 @@ def say(text: str) -> None:
     click.echo(visible(text), err=True)
 
 
+def wrapped(text: str) -> str:
+    """A text in lines of the width of the screen, broken between words."""
+    from rich.text import Text
+
+    return "\n".join(line.plain.rstrip() for line in Text(text).wrap(console(), console().width))
+
+
 def show(renderable: RenderableType) -> None:
     """Print a result on standard output;
     in a file or a pipe without the blanks that fill up lines.

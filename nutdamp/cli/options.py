@@ -141,6 +141,7 @@ class Count(click.ParamType):  # type: ignore[type-arg]
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 GOAL = "Goal and motion"  # heading of the options of the goal
+SCHEME = "Scheme"  # headings of the options of schemes begin so
 WIDEST = 26  # characters of an option that its help comes beside; below a longer one
 SHARED = names_of(SchemeOptions)  # options of every scheme
 NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
@@ -190,7 +191,7 @@ def scheme_options(command: Command) -> Command:
             metavar = None if kind.names or kind.unit else "N"
             settings = {"type": value, "default": field.default, "metavar": metavar}
             settings["show_default"] = field.default is not None
-        group = f"Scheme {' and '.join(schemes)}"
+        group = f"{SCHEME} {' and '.join(schemes)}"
         text = field.metadata["help"]
         option = click.option(
             f"--{name.replace('_', '-')}", cls=Grouped, group=group, help=text, **settings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -62,10 +63,11 @@ def compared_with(
     expect_read(names or usual(job.spacecraft), job.options, job.spacecraft, job.doubt)
     with job.working("planning"):
         compared = compare(job.spacecraft, names, job.options, samples=samples, timed=timed)
-        if not robust or samples is not None or not compared.too_few_comply:
-            return compared
-        from nutdamp.planning.robust import with_robust  # dispersions that few cases of a plan bear
+    if not robust or samples is not None or not compared.too_few_comply:
+        return compared
+    from nutdamp.planning.robust import with_robust  # dispersions that few cases of a plan bear
 
+    with job.working("planning for the dispersions"):
         return with_robust(compared, job.options)
 
 
@@ -156,7 +158,9 @@ def plan_command(
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
         job.note(comparison_warnings(compared))
-    job.deliver(None, partial(_screen, compared, dispersed, verbose), more=more, unsaved=unproved)
+    file = "" if job.given.path is None else shlex.quote(job.given.path)
+    screen = partial(_screen, compared, dispersed, verbose, file)
+    job.deliver(None, screen, more=more, unsaved=unproved)
     leave(judged.status, failed=show_failures(compared))
 
 
@@ -201,14 +205,16 @@ def _certified(
 
 
 def _screen(
-    compared: Comparison, dispersed: RobustComparison | None, verbose: bool
+    compared: Comparison, dispersed: RobustComparison | None, verbose: bool, file: str
 ) -> RenderableType:
-    from nutdamp.views.glance import comparison_screen, glance
+    from nutdamp.views.glance import glance
+
+    if dispersed is None and not verbose:
+        return glance(compared, file=file)
+    from nutdamp.views.robust import comparison_screen, robust_notes, robust_screen
 
     if dispersed is None:
-        return comparison_screen(compared) if verbose else glance(compared)
-    from nutdamp.views.robust import robust_notes, robust_screen
-
-    return (
-        robust_screen(dispersed) if verbose else glance(dispersed.joined, robust_notes(dispersed))
-    )
+        return comparison_screen(compared)
+    if verbose:
+        return robust_screen(dispersed)
+    return glance(dispersed.joined, robust_notes(dispersed), file=file)

@@ -88,8 +88,10 @@ def fronts_of(
 def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
     """The pulses that a command flies, as a plan; raises Infeasible where there is none.
 
-    ``judged``: a verdict names the cones that are broken.
+    ``judged``: a screen names the plan and the cones that are broken, and its last lines are the
+    notes; without a screen they are printed at once.
     """
+    judged = judged and not job.silent
     from nutdamp import api
     from nutdamp.planning.causes import infeasibility
     from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
@@ -110,9 +112,9 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
         compared = compared_with(job, ())
         recommended = compared.recommended
         show_failures(compared)
-        if recommended is not None:
+        if recommended is not None and not judged:
             job.remark(f"using recommended plan: {recommended.scheme}")
-        job.note(comparison_warnings(compared, tabulated=judged))
+        job.planned += comparison_warnings(compared, tabulated=judged)
         if recommended is None:
             raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
         plan = recommended
@@ -122,7 +124,9 @@ def plan_or_read(job: Job, *, judged: bool = False) -> Plan:
             plan = api.plan(job.spacecraft, scheme, job.options)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
-    job.note(plan_notes(plan, cones=scheme is not None and not judged))
+    job.planned += plan_notes(plan, cones=scheme is not None and not judged)
+    if not judged:
+        job.note(job.planned)
     return plan
 
 
@@ -148,7 +152,7 @@ def animate_command(
     job: Job, until: float | None, seconds: float | None, fps: int, width: int
 ) -> None:
     """Film the body cone rolling on the space cone through the pulses, flown with their real
-    widths.
+    on-times.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example.
     A FILE of - is standard output, as GIF.
@@ -191,7 +195,7 @@ def animate_command(
     "--flown",
     "real",
     is_flag=True,
-    help="Propagate real pulse widths instead of the impulse sum (17).",
+    help="Propagate real on-times instead of the impulse sum (17).",
 )
 @click.option(
     "--until",
@@ -216,7 +220,7 @@ def simulate_command(
     - is standard output, for --schedule standard input.
     """
     job.begin()
-    plan = plan_or_read(job, judged=not job.silent)
+    plan = plan_or_read(job, judged=True)
 
     from nutdamp.api import simulate
     from nutdamp.planning.simulation import model_warnings
@@ -224,7 +228,12 @@ def simulate_command(
     simulation = simulate(plan, until, flown=real, samples=samples)
     if job.silent:
         job.note(model_warnings(simulation.impulses, simulation.flown))
-    job.deliver(simulation, more=job.carried(plan, at, simulation.until), verbose=verbose)
+    job.deliver(
+        simulation,
+        more=job.carried(plan, at, simulation.until),
+        verbose=verbose,
+        planned=job.planned,
+    )
     leave(simulation.verdict.status)
 
 
@@ -604,7 +613,7 @@ def disperse_command(
         expect_loop(spacecraft)
         job.figure = None
     expect_dispersions(spacecraft.dispersions)
-    plan = None if looped else plan_or_read(job)
+    plan = None if looped else plan_or_read(job, judged=case is None)
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)
         return
@@ -615,7 +624,9 @@ def disperse_command(
             flown = api.disperse_loop(spacecraft, samples, until=until, remark=job.remark, **hooks)
         else:
             flown = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
-    job.deliver(flown, unsaved=[flown.unsaved], verbose=verbose, worst=worst)
+    job.deliver(
+        flown, unsaved=[flown.unsaved], verbose=verbose, planned=job.planned or None, worst=worst
+    )
     if stopped.number is not None and flown.core.done < flown.core.requested:
         say(f"interrupted: {flown.core.done} of {flown.core.requested} cases are done")
         sys.exit(128 + stopped.number)

@@ -387,11 +387,11 @@ def _titled(title: str, spacecraft: Spacecraft) -> str:
 
 def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
     """Verdict, and the final H of the cases; percentiles, budget and worst cases behind a title."""
-    from nutdamp.views.dispersion import cone_lines, dispersion_screen, verdict_lines
+    from nutdamp.views.dispersion import dispersion_screen, verdict_lines
 
     judged, results = dispersed.verdict, dispersed.core
     told = [line for line in verdict_lines(judged, results) if isinstance(line, Text)]
-    lines = [Prose(document.plain(line)) for line in (*told, *cone_lines(results))]
+    lines = [Prose(document.plain(line)) for line in told]
     note = results.study.lightening_error
     lines += [Prose(f"Note: {note}.")] if note else []
     required = document.sheet(verdicts.bound_table(judged))

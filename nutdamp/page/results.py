@@ -251,7 +251,7 @@ def html(
 def _blocks(result: Spacecraft | Plan | Flight | Comparison | Dispersion) -> Iterator[Block]:
     from nutdamp.page.document import FactList, Prose, facts_of, sheet
     from nutdamp.views import dispersion, verdict
-    from nutdamp.views.parts import derived_table
+    from nutdamp.views.decisions import derived_table
 
     if isinstance(result, Spacecraft):
         yield facts_of(result.name, derived_table(result))

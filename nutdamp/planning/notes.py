@@ -204,6 +204,7 @@ def verdict_notes(verdict: Verdict, plan: Plan, *, looped: bool = False) -> Iter
         yield note(
             "disturbed-after",
             at_s=max(spacecraft.edges),
+            earliest=f"{math.ceil(max(spacecraft.edges))} s",
             nutation_deg=math.degrees(disturbed.nutation),
             off_deg=math.degrees(disturbed.aim),
         )

@@ -48,6 +48,10 @@ from nutdamp.spacecraft.roles import with_limits
 
 # later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
+# Work of the tolerances needed and of cases of the chosen plan, in searches of optimal: as long as
+# two of them for configs/single-thruster.yaml.
+SETTLING = 2.0
+
 # Ends by which the scheme optimal is to be done with least cost, over the earliest one; the first
 # for spin-up.yaml, of which 99.98 % of the cases comply with H kept, and at most 98.4 % with the
 # others.
@@ -158,11 +162,13 @@ class Variation(NamedTuple):
     """Lazy ``plans``, each with the label of its variant.
 
     ``falling``: from the surest one down, so that those after one with which too few cases comply,
-    and no more than with the one before, need not be made.
+    and no more than with the one before, need not be made. ``size``: its work, in searches of
+    `optimal`, of which a plan takes one at most.
     """
 
     plans: Callable[[], Iterable[tuple[str, Plan]]]
     falling: bool = False
+    size: float = 0.1
 
 
 Rounds = tuple[list[Variation], list[Variation], list[Variation]]
@@ -187,16 +193,18 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> Rou
         for variant, other in _others(spacecraft, base):
             others.append(Variation(partial(_planned, variant, other, base.scheme, options)))
         if scheme is OPTIMAL:
-            first.append(Variation(partial(chance_plan.plans, spacecraft, options), True))
+            first.append(Variation(partial(chance_plan.plans, spacecraft, options), True, 1.0))
             large = partial(chance_plan.plans, spacecraft, options, chance_plan.LARGE)
-            first.append(Variation(large))
+            first.append(Variation(large, size=1.0))
             settled = planner.settled(OPTIMAL, options, spacecraft)
-            early.append(Variation(partial(_early, spacecraft, options, ""), True))
+            searches = 1.0 + len(WITHIN)
+            early.append(Variation(partial(_early, spacecraft, options, ""), True, searches))
             # Free, the pulses on either side of a long axial one damp what the moments of inertia
             # decide; spin-up.yaml: 73 % of its cases comply, and 99.98 % with H kept.
             if isinstance(settled, OptimalOptions) and settled.free_axis:
                 keeping = Options(**{**options.chosen, "free_axis": False, "shift": 0.0})
-                early.append(Variation(partial(_early, spacecraft, keeping, ", H kept"), True))
+                kept = partial(_early, spacecraft, keeping, ", H kept")
+                early.append(Variation(kept, True, searches))
     return first, early, others
 
 
@@ -225,13 +233,19 @@ def compare(
     cheap = SLACK * min(nominal, default=0.0)
     chosen: FlownPlan | None = None
     unspent = work.FRONTS
-    with work.steps(1.5 * count, SEARCH, hook=lambda done, _: progress(done, count)) as steps:
+    sizes = [math.fsum(variation.size for variation in variations) for variations in rounds]
+    made = 0
+    settling = SETTLING if allocate else 0.0
+    with work.steps(sizes[0] + sizes[1] + settling, SEARCH) as steps:
         for number, variations in enumerate(rounds):
             before = len(entries)
+            if number == len(rounds) - 1:  # few come so far
+                steps.expected += sizes[number]
             with work.budget("the robust plans", unspent) as spent, work.no_cures():
                 for variation in variations:
                     _fly(comparison, variation, entries)
-                    steps.reach(steps.done + 1)
+                    made += 1
+                    progress(made, count)
             unspent -= spent.done
             chosen, ground, fresh = _confirmed(entries, comparison.recommended, comparison.least)
             saves = comparison.least == LEAST[0]
@@ -242,20 +256,21 @@ def compare(
             ahead = best is not None and best.variant != AS_PLANNED
             if number == 1 and (ahead or (chosen is not None and len(entries) > before)):
                 break
-        steps.reach(count)
-    if chosen is not None:
-        return _result(comparison, entries, chosen, ground, fresh)
-    chosen, ground, equals = _nearest(
-        list(entries.values()), comparison.recommended, comparison.least
-    )
-    if chosen is None or not allocate or not requirements.judged(spacecraft):
-        return _result(comparison, entries, chosen, ground, equals=equals)
-    needed = (
-        None
-        if chosen.cases.enough
-        else tightening(chosen.plan, required_share(spacecraft.requirement))
-    )
-    return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
+        progress(count, count)
+        if chosen is not None:
+            return _result(comparison, entries, chosen, ground, fresh)
+        steps.reach(steps.expected - settling)
+        chosen, ground, equals = _nearest(
+            list(entries.values()), comparison.recommended, comparison.least
+        )
+        if chosen is None or not allocate or not requirements.judged(spacecraft):
+            return _result(comparison, entries, chosen, ground, equals=equals)
+        needed = (
+            None
+            if chosen.cases.enough
+            else tightening(chosen.plan, required_share(spacecraft.requirement))
+        )
+        return _result(comparison, entries, chosen, ground, _fresh(chosen), needed, equals)
 
 
 def with_robust(comparison: Comparison, options: Options | None = None) -> Comparison:
@@ -275,15 +290,17 @@ def with_robust(comparison: Comparison, options: Options | None = None) -> Compa
 def _fly(comparison: Comparison, variation: Variation, entries: dict[object, FlownPlan]) -> None:
     """Let plans of a variation fly their first cases, and enter those that are new."""
     share = 0.0
-    for variant, plan in () if work.exhausted() else variation.plans():
-        candidate = None if _kind(plan) in entries else _entered(comparison, plan, variant)
-        if candidate is None:
-            continue
-        entries[_kind(plan)] = candidate
-        worse = candidate.cases.enough is False and _complying(candidate) <= share
-        if work.exhausted() or (variation.falling and worse):
-            return
-        share = _complying(candidate)
+    with work.steps(variation.size, variation.size) as steps:
+        for variant, plan in () if work.exhausted() else variation.plans():
+            steps.reach(steps.done + 1.0)
+            candidate = None if _kind(plan) in entries else _entered(comparison, plan, variant)
+            if candidate is None:
+                continue
+            entries[_kind(plan)] = candidate
+            worse = candidate.cases.enough is False and _complying(candidate) <= share
+            if work.exhausted() or (variation.falling and worse):
+                return
+            share = _complying(candidate)
 
 
 def _complying(candidate: FlownPlan) -> float:

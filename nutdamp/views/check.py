@@ -26,10 +26,18 @@ from nutdamp.planning.capability import Acting, ChannelSteps, Consequence
 from nutdamp.planning.notes import shift_notes, spacecraft_notes
 from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
+from nutdamp.views.decisions import (
+    aspects_json,
+    derived_table,
+    direction_json,
+    spacecraft_json,
+)
 from nutdamp.views.guide import Topic
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.parts import derived_table, named, summary
+from nutdamp.views.parts import (
+    named,
+    summary,
+)
 from nutdamp.views.tables import (
     TEXT,
     Column,
@@ -49,7 +57,7 @@ from nutdamp.views.text import (
     small_angle,
     vector,
 )
-from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
+from nutdamp.views.tolerances import correlation_json, in_words, size_text, unused_notes
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
@@ -73,7 +81,7 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
             "screen json",
             kind=TEXT,
         ),
-        Column("", Shared.ON_TIME, "", on_times, where="screen"),
+        Column("", Shared.ON_TIME, "", on_times, where="screen", rank=2),
         *file_columns(
             "json", "min_on_time_s=channel.min_on_time", "max_on_time_s=channel.max_on_time"
         ),
@@ -84,7 +92,9 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
             lambda step: small_angle(step) if step else "any",
             "screen json",
         ),
-        Column.named("largest_step_deg=largest", "largest step", "deg", small_angle, "screen json"),
+        Column.named(
+            "largest_step_deg=largest", "largest step", "deg", small_angle, "screen json", rank=1
+        ),
         *file_columns("json", "damps=channel.damps"),
     )
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
@@ -100,9 +110,15 @@ def channel_topics(spacecraft: Spacecraft, name: str) -> Iterator[Topic]:
         if channel.name == name:
             force = 0.0 if channel.force is None else math.hypot(*channel.force)
             arm = f"{channel.strength / force:.4g} m" if force else "not known"
+            impulses = [
+                f"{channel.strength * time:.4g}"
+                for time in (channel.min_on_time, channel.max_on_time)
+                if math.isfinite(time)
+            ]
             rows = [
                 ("thrusters", ", ".join(thruster.name for thruster in channel.thrusters)),
                 ("arm", arm),
+                ("impulse, N m s", " to ".join([*impulses, "any"][:2])),
                 *zip(headings[1:], cells[1:], strict=True),
             ]
             text = "\n".join(f"- **{heading}**: {cell}" for heading, cell in rows)
@@ -316,8 +332,7 @@ def _notes(spacecraft: Spacecraft, *, verbose: bool) -> Iterator[Note]:
         yield note("dates-end", horizon_s=spacecraft.horizon)
     if clock is not None and clock.refusal:
         yield note("no-sun-pulse", why=clock.refusal)
-    for names, reason in without_effect(() if dispersions is None else reachable(spacecraft)[1]):
-        yield note("dispersions-unused", dispersions=names, why=reason)
+    yield from unused_notes(() if dispersions is None else reachable(spacecraft)[1])
     idle = [channel.name for channel in spacecraft.channels if not channel.damps]
     if idle:
         yield note("never-damping", channels=", ".join(idle))
@@ -402,10 +417,10 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             if stepped is None
             else f"in steps of {duration(stepped)}, {widths[0]} to {widths[-1]}"
         )
-        yield "width", steps or listed(widths, "or")
+        yield Shared.ON_TIME, steps or listed(widths, "or")
         every = listed([str(count) for count in commands.every], "or")
         together = "; two in the same turns" if commands.per_turn > 1 else ""
-        counted = f"at most {commands.max_count} pulses; every: {every} of the spins"
+        counted = f"at most {commands.max_count} pulses; every: {every} of the turns"
         yield "block", f"{counted}{together}"
 
 

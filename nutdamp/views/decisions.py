@@ -1,17 +1,23 @@
-"""Plans, comparisons, certificates and spacecraft as JSON-ready dictionaries.
+"""Derived quantities of spacecraft; and plans, comparisons and certificates as JSON-ready
+dictionaries.
 
 Vectors are in the axes of the file, angles in degrees.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
-from nutdamp.flight.cones import Aspect
+from nutdamp.flight.cones import Aspect, at_start
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import Comparison
@@ -23,12 +29,23 @@ from nutdamp.planning.notes import (
     spacecraft_notes,
     verdict_notes,
 )
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.plan import NO_NUTATION, Plan
 from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.views.parts import commanded, direction_columns
-from nutdamp.views.tables import values_of
-from nutdamp.views.text import joined, note_json, ordered
+from nutdamp.units import screen_unit
+from nutdamp.views.parts import (
+    aspect_facts,
+    changing,
+    commanded,
+    direction_columns,
+    named,
+    required,
+    spin_text,
+    target_text,
+    title,
+)
+from nutdamp.views.tables import facts, values_of
+from nutdamp.views.text import degrees, duration, joined, note_json, ordered, quantity
 from nutdamp.views.verdict import cases_json, line_json, verdict_json
 
 if TYPE_CHECKING:
@@ -109,6 +126,87 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "target_axis": cleaned(spacecraft.target_axis).tolist(),
         **values_of(spacecraft, "target_angle_deg=to_turn", "target_spin_rad_s=goal.spin"),
     }
+
+
+def opening(spacecraft: Spacecraft, verbose: bool) -> tuple[RenderableType, ...]:
+    """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
+    if verbose:
+        return named(spacecraft), derived_table(spacecraft), Text()
+    return (title(spacecraft),)
+
+
+def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
+    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
+
+
+def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    inertia = spacecraft.inertia
+    motion = spacecraft.widest
+    moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
+    yield "inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}"
+    if not inertia.symmetric:
+        unit, factor = screen_unit("kg m²")
+        first, second, _ = factor * np.asarray(inertia.moments)
+        yield (
+            "",
+            f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; schemes but optimal plan on their mean",
+        )
+    if inertia.wheel:
+        whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
+        yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
+    reversed_ = ": the spin axis is body axis -3" if spacecraft.sense < 0.0 else ""
+    yield "spin", f"{spin_text(spacecraft.spin)}{reversed_}"
+    now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
+    cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
+    yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
+    period = spacecraft.motion_period
+    still = math.isinf(period)
+    in_body = (
+        "none in the body, where ω does not turn" if still else f"{duration(period)} in the body"
+    )
+    yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
+    if spacecraft.dissipation is not None:
+        yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
+    # Causes that break the floors A|ω0| and C|ω3|β.
+    unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
+    beyond = " and ".join([*unequal, *changing(spacecraft)])
+    floor = f"no least impulse with {beyond}" if beyond else "lower bound"
+    name = "impulse" if beyond else "least impulse"
+    yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
+    if spacecraft.goal.axis is not None:
+        symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
+        turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
+        turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
+        bound = "" if beyond else ", the least to turn H"
+        yield "target", target_text(spacecraft)
+        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{bound}"
+    if spacecraft.goal.spin is not None:
+        yield "final spin", spin_text(spacecraft.goal.spin)
+    actuators = []
+    torquer = spacecraft.torquer
+    if torquer is not None:
+        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
+        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
+        actuators.append(f"steerable torquer, {strength}{assumed}")
+    if spacecraft.channels:
+        actuators.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
+    yield "actuators", "; ".join(actuators)
+    bounds = required(spacecraft)
+    if bounds:
+        yield "requirement", bounds
+
+
+def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
+    """Effect of energy dissipation on the nutation,
+    and a note where it is too fast for its model.
+    """
+    if spacecraft.growth == 0.0:
+        return "none: a sphere has no energy to lose"
+    what = "grows" if spacecraft.growth > 0.0 else "decays"
+    slow = time_constant >= spacecraft.inertial_period
+    rough = "" if slow else "; less than one inertial period: results are rough"
+    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
 
 
 def plan_json(plan: Plan) -> dict[str, Any]:

@@ -16,6 +16,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note
 from nutdamp.files.export import column, cone_columns
 from nutdamp.flight.propagation import IDEAL_IMPULSES, model_name
 from nutdamp.montecarlo.inputs import DispersedInput
@@ -24,13 +25,13 @@ from nutdamp.montecarlo.study import Results, Study
 from nutdamp.planning.causes import main_causes
 from nutdamp.planning.screening import Dispersion
 from nutdamp.planning.verdict import Verdict
-from nutdamp.spacecraft.model import Keep, Spacecraft
+from nutdamp.spacecraft.model import Keep
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.glance import end_rows
-from nutdamp.views.parts import bounds_text, named, summary
+from nutdamp.views.parts import named, summary
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -41,7 +42,7 @@ from nutdamp.views.tables import (
     to_figures,
     values_of,
 )
-from nutdamp.views.text import degrees, digits
+from nutdamp.views.text import digits, ordered, screen_line
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.controller import Ending
@@ -100,9 +101,13 @@ EMPTY = (
 """Note on a case whose tank runs empty."""
 
 
-def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) -> RenderableType:
-    """The screen of ``disperse``: verdict, percentiles, what counts most, and worst cases."""
-    results, judged, spacecraft = flown.core, flown.verdict, flown.plan.spacecraft
+def dispersion_screen(
+    flown: Dispersion, *, worst: int, verbose: bool = True, planned: Sequence[Note] = ()
+) -> RenderableType:
+    """The screen of ``disperse``: verdict, percentiles, what counts most, and worst cases;
+    ``planned``: notes on the plan that it flies.
+    """
+    results, judged = flown.core, flown.verdict
     study = results.study
     ideal = model_name([study.model.schedule]) == IDEAL_IMPULSES
     how = "ideal impulses" if ideal else "full simulation"
@@ -123,24 +128,24 @@ def dispersion_screen(flown: Dispersion, *, worst: int, verbose: bool = True) ->
         return summary(
             [*head, *emptied],
             lambda **_: percentiles.screen("screen"),
-            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused)],
+            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused), *planned],
             f"--plot cases.png{case}",
         )
-    parts = [*head, Text(), percentiles.screen("full"), angles_note(spacecraft)]
+    parts = [*head, Text(), percentiles.screen("full")]
     if not results.exact:
         right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
         parts.append(Text(right, style="dim"))
     ends = facts(end_rows(flown.plan._flight, flown.plan._aspects))
     parts += [Text(), Text("Nominal case", style="bold"), ends]
-    events = [*cone_lines(results), *emptied]
-    if events:
-        parts += [Text(), *events]
+    if emptied:
+        parts += [Text(), *emptied]
     parts += [Text(), *tolerances.tolerance_budget(results)]
     if worst and varies:
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
         parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim"))
-    return Group(*parts, *tolerances.unused_table(study.model.inputs.unused))
+    notes = ordered([*tolerances.unused_notes(study.model.inputs.unused), *planned])
+    return Group(*parts, *map(screen_line, notes))
 
 
 def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
@@ -281,13 +286,6 @@ def beside(value: float, largest: float) -> str:
     return text if float(text) else text.lstrip("-")
 
 
-def angles_note(spacecraft: Spacecraft) -> Text:
-    """Note on the reference of the angles of H in dispersed cases."""
-    aim = "H at t = 0 with nominal values" if spacecraft.goal.axis is None else "the target"
-    note = f"Momentum shift: from H at t = 0 of the same case; axis error: from {aim}."
-    return Text(f"{note} The spin axis swings about H by the nutation.", style="dim")
-
-
 # --- requirement and cones
 
 
@@ -313,21 +311,6 @@ def requirement_of(judged: Verdict) -> dict[str, Any] | None:
         return None
     shares = {name: entry[name] for name in ("met_fraction", "low", "high", "probability")}
     return {**shares, "confidence": 0.95, "met": judged.met}
-
-
-def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
-    """Number of cases that break each cone, and range of the angles from the spin axis to its
-    direction.
-    """
-    for keep, entry in _cones(results):
-        share = verdicts.percent(entry["broken_fraction"], 1.0 - results.probability)
-        bounds = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
-        near, far, *alone = (degrees(math.radians(entry[key])) for key in bounds)
-        yield Text.assemble(
-            (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),
-            (f"broken in {share} of cases", "red" if entry["broken_fraction"] else "green"),
-            f"; {near} to {far} in all cases, {alone[0]} to {alone[1]} in the nominal one.",
-        )
 
 
 def cones_json(results: Results | LoopResults) -> dict[str, Any]:

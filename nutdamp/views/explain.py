@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from itertools import islice
 from typing import ClassVar
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -21,13 +23,16 @@ from nutdamp.views import guide
 from nutdamp.views.guide import Topic
 
 
-def _notes() -> Iterator[tuple[str, str]]:
+@cache
+def _notes() -> list[tuple[str, str]]:
+    notes = []
     for heading, entry in guide.page("notes").sections[1:]:
         words = " ".join(entry.replace("\n> ", " ").split()).removeprefix("> ")
         shown = re.sub(
             r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", words
         )
-        yield heading.partition(" (")[0], shown
+        notes.append((heading.partition(" (")[0], shown))
+    return notes
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
@@ -44,7 +49,7 @@ and their paragraph.
 ALIKE = ("glossary", "symbol")  # kinds whose names of one paragraph mean the same
 
 _UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
-    r"([-,]+(N-m(-s)?|ft-lbf(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
+    r"([-,]+(N-m(-s)?|ft-lbf(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|counts|turn|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
 )
 
 
@@ -74,6 +79,8 @@ def explained(
                 return own
             if guide.NUMBER.fullmatch(requested.strip().casefold()):
                 raise
+            if passages := _passages(requested):
+                return Topic(requested, "where the guide has it", _listed(passages))
             near = guide.meant(nearest(wanted, guide.NAMES) or wanted, tuple(names()))
             raise BadRequest(f"there is no topic {requested!r}; {near}") from None
         if not texts and len(keys) == 1:
@@ -103,6 +110,22 @@ def names() -> Iterator[str]:
     yield from (path for path, _ in file_keys())
 
 
+def completed(begun: str) -> list[str]:
+    """Names that begin so, with hyphens for blanks."""
+    hyphened = {name.replace(" ", "-") for name in names()}
+    return sorted(name for name in hyphened if name.startswith(begun))
+
+
+def completed_keys(begun: str) -> list[str]:
+    """Keys of the file that begin so, as ``--set`` takes them; entries of lists, which each file
+    names, are not.
+    """
+    keys = [path for path, _ in file_keys()]
+    lists = tuple(path.removesuffix("name") for path in keys if path.endswith(".name"))
+    return [f"{path}=" for path in keys if path.startswith(begun) and not path.startswith(lists)]
+
+
+@cache
 def _folded(name: str) -> str:
     """Names in small letters with hyphens; a single letter, which is a symbol, as it is."""
     return re.sub(
@@ -110,6 +133,7 @@ def _folded(name: str) -> str:
     )
 
 
+@cache
 def _bare(name: str) -> str:
     """A name as `_folded`, without the unit at its end."""
     hyphened = re.sub(r"[\s_]+", "-", name.strip())
@@ -143,6 +167,28 @@ def _sections(wanted: str) -> Iterator[Topic]:
                 folded = _folded(title)
                 if folded == wanted or (begins and len(wanted) > 3 and folded.startswith(wanted)):
                     yield Topic(title, f"in explain {name}", text)
+
+
+PASSAGES = 6  # most passages shown of a word that is no topic: few are read to the end
+
+
+def _passages(requested: str) -> list[tuple[str, str]]:
+    """Entries and paragraphs of the guide that have the words ``requested``, and their names."""
+    wanted = requested.strip().casefold()
+    word = re.compile(rf"(?<!\w){re.escape(wanted)}(?!\w)")
+    having = (entry for entry, folded in _guide() if wanted in folded and word.search(folded))
+    return [*islice(having, PASSAGES)]
+
+
+@cache
+def _guide() -> list[tuple[tuple[str, str], str]]:
+    """Names and texts of entries and paragraphs, and both folded to small letters."""
+    entries = [entry for _, source in WORDS for entry in source()]
+    pages = ((name, guide.page_or_topic(name).text) for name in guide.NAMES)
+    for name, page in pages:
+        entries += [(name, text) for text in re.split(r"\n\n|\n(?=- )", page)]
+    plain = ((name, " ".join(text.split())) for name, text in (*entries, *file_keys()))
+    return [(entry, ": ".join(entry).casefold()) for entry in plain]
 
 
 def file_keys() -> Iterator[tuple[str, str]]:

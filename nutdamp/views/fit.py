@@ -29,8 +29,8 @@ from nutdamp.estimation.results import (
 from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
-from nutdamp.views.decisions import heading
-from nutdamp.views.parts import direction_columns, opening, summary
+from nutdamp.views.decisions import heading, opening
+from nutdamp.views.parts import direction_columns, summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
 from nutdamp.views.text import fixed, note_json
 
@@ -110,10 +110,10 @@ ESTIMATES = (
         words=_sigma,
     ),
     Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
-    Column("file", "file", "", partial(_scaled, "file"), where="screen json", words=_file),
+    Column("file", "file", "", partial(_scaled, "file"), where="screen json", words=_file, rank=1),
     Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),
     Column.named("change_sigmas=change", "change", "sigmas", _changed, "screen json"),
-    Column.named("from=source", "from", "", where="screen json", kind=TEXT),
+    Column.named("from=source", "from", "", where="screen json", kind=TEXT, rank=2),
 )
 
 
@@ -127,8 +127,10 @@ def pointing_table(fit: Fit, time: float) -> DataTable:
     sigmas = (
         Column.named("sigma_along_deg=along", "sigma along", "deg", digits, "screen json"),
         Column.named("sigma_across_deg=across", "sigma across", "deg", digits, "screen json"),
-        Column.named("correlation", "correlation", "", partial(fixed, digits=2), "screen json"),
-        Column.named("from=source", "from", "", where="screen json", kind=TEXT),
+        Column.named(
+            "correlation", "correlation", "", partial(fixed, digits=2), "screen json", rank=2
+        ),
+        Column.named("from=source", "from", "", where="screen json", kind=TEXT, rank=1),
     )
     name = Column.named("direction=name", "direction", "", where="screen json", kind=TEXT)
     return DataTable("Pointing", (name, *angles, *sigmas), pointings(fit, time))

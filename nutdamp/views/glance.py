@@ -12,7 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.common.numerics import RPM
+from nutdamp.common.numerics import MISSING, RPM
 from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
 from nutdamp.flight.propagation import REAL_WIDTHS, Flight, model_name
@@ -21,7 +21,6 @@ from nutdamp.planning.notes import (
     alternatives,
     comparison_warnings,
     plan_notes,
-    reasons,
     spacecraft_notes,
     verdict_notes,
 )
@@ -29,6 +28,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import parts
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.tables import (
@@ -45,11 +45,8 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     degrees,
     digits,
-    joined,
     moment,
     ordered,
-    screen_line,
-    sentence,
     short_angle,
     small_angle,
     text,
@@ -179,7 +176,8 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         angle = angle_of(f"flown.{name}")
         if "screen" in where:
             short = shortly(largest[name != "nutation"])
-            residuals.append(Column("", heading, "", angle, short, "screen"))
+            order = 0 if name == "nutation" else 2
+            residuals.append(Column("", heading, "", angle, short, "screen", rank=order))
         where = f"{where.removeprefix('screen ')} csv"
         residuals.append(Column(f"{name}_deg", heading, "deg", angle, small_angle, where))
     axes, momenta = [], []
@@ -208,9 +206,9 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         Column("status", "", "", status, where="csv", kind=TEXT),
         Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
         Column("met_fraction", "", "", share, where="csv"),
-        Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE, rank=3),
         Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE),
-        Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen"),
+        Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen", rank=1),
         Column.named("end_s=schedule.end", "end", "s", "{:.3f}".format, "full page csv"),
         Column.named(
             "total_impulse_Nms=schedule.total_impulse",
@@ -292,24 +290,27 @@ def _bound(bound: Bound, plan: Plan) -> str:
     return shown if line.met else f"{NOT} {shown}"
 
 
-def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> RenderableType:
+def glance(
+    compared: Comparison, robust: Sequence[Note] | None = None, *, file: str = ""
+) -> RenderableType:
     """The screen of a comparison and the plan to fly, one of those compared, or of the reason why
     there is none.
 
-    ``robust``: notes on the choice, where dispersed cases made it.
+    ``robust``: notes on the choice, where dispersed cases made it; ``file``: of the spacecraft, as
+    commands name it.
     """
     judged, plan = compared.verdict, compared.recommended
-    head = [*parts.title(compared.spacecraft), headline(compared)]
+    head = [parts.title(compared.spacecraft), headline(compared)]
     fired = None
     ending: list[RenderableType] = []
     if plan is not None:
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
-        ending = [verdicts.bound_table(judged).screen("screen"), ends(plan), Text()]
+        ending = [verdicts.bound_table(judged).screen("screen"), axis_line(plan), Text()]
         if plan.pulses.blocks:
             fired = parts.block_table(plan._flight)
         else:
             fired = parts.pulse_table(plan._flight, limit=limits(compared.spacecraft)[0])
-    schemes = scheme_table(compared, plan).screen("screen", between=" ")
+    schemes = scheme_table(compared, plan).screen("screen")
 
     def table(first: int | None = None) -> RenderableType:
         rows = (
@@ -319,11 +320,26 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
         )
         return Group(*rows, schemes)
 
-    written = (
-        "--blocks blocks.csv" if plan is not None and plan.pulses.blocks else "--csv pulses.csv"
-    )
     every = [*(robust or ()), *notes(compared, robust=robust is not None)]
-    return parts.summary(head, table, every, f"{written} · --plot plan.png · nutdamp report")
+    return parts.summary(head, table, every, parts.STEP.join(steps(plan, file)), lines=LINES)
+
+
+LINES = (24, 30)  # of the screen, and of one narrower than 80 characters
+
+
+def steps(plan: Plan | None, file: str) -> Iterator[str]:
+    """Next steps: commands and options that tell more of the plan to fly, or take it further."""
+    blocks = plan is not None and bool(plan.pulses.blocks)
+    channel = (
+        next((pulse.channel for pulse in plan.pulses if pulse.channel != STEERABLE), "")
+        if plan
+        else ""
+    )
+    if channel:
+        yield f"nutdamp explain {channel} {file}".rstrip()
+    yield "--blocks blocks.csv" if blocks else "--csv pulses.csv"
+    yield "--plot plan.png"
+    yield "nutdamp report"
 
 
 def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
@@ -365,71 +381,35 @@ def ends(plan: Plan) -> Table:
     if not spacecraft.inertia.wheel and residual.body_cone < 0.5 * math.pi:
         angles.append(f"body cone {short_angle(residual.body_cone, limit)}")
         angles.append(f"space cone {short_angle(residual.space_cone, limit)}")
-    rows = [("after pulses, deg", "  ".join(angles))]
-    axis = ", ".join(
-        f"{SHORT_NAMES.get(column.heading, column.heading)} {column.worded(flight.final.axis)}"
-        for column in parts.direction_columns(spacecraft)
-    )
     if spacecraft.goal.axis is None:
         momentum = f"turned by {short_angle(residual.momentum_shift, turn)} deg"
     else:
         momentum = f"{short_angle(residual.axis_error, turn)} deg off target"
         momentum += parts.by_the_sun(spacecraft)
-    final = flight.final.spin
-    spin = "" if requirements.spins_at(spacecraft, final) else f"; spin {final * RPM:.5g} rpm"
-    rows.append(("axis", f"{axis}; H {momentum}{spin}"))
+    rows = [("after pulses, deg", "  ".join(angles)), ("H", momentum), ("axis", _axis(plan))]
     if len(plan.pulses) and lasting(flight):
         rows.append(("", lasting(flight)))
     return facts(rows)
 
 
-def comparison_screen(compared: Comparison) -> RenderableType:
-    """All tables of ``plan``, the verdict on top."""
-    judged, chosen = compared.verdict, compared.recommended
-    schemes = scheme_table(compared, chosen).transposed("full")
-    results: list[RenderableType] = [
-        Text(),
-        parts.derived_table(compared.spacecraft),
-        Text(),
-        schemes,
+def axis_line(plan: Plan) -> Text:
+    """Direction of the spin axis after the pulses, and what changes it then."""
+    later = lasting(plan._flight) if len(plan.pulses) else ""
+    return Text.assemble(("axis  ", "dim"), _axis(plan), f" {later}" if later else "")
+
+
+def _axis(plan: Plan) -> str:
+    spacecraft, final = plan.spacecraft, plan._flight.final
+    angles = [
+        (SHORT_NAMES.get(column.heading, column.heading), column.shown(final.axis))
+        for column in parts.direction_columns(spacecraft)
     ]
-    lead: list[RenderableType] = [parts.named(compared.spacecraft), headline(compared)]
-    general = map(screen_line, ordered(spacecraft_notes(compared.spacecraft)))
-    remarks = [note for plan in compared.plans for note in plan_notes(plan)]
-    results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
-    if chosen is None:
-        return Group(*lead, *general, *results)
-    pulses = chosen.pulses
-    if pulses.blocks:
-        results += [Text(), parts.blocks_screen(chosen._flight, chosen._delta_v)]
-    elif len(pulses):
-        totals: dict[str, float] = {}
-        for pulse in pulses:
-            totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
-        on_times = facts(
-            (f"on-time of {channel}", f"{total:.4f} s") for channel, total in totals.items()
-        )
-        results += [Text(), parts.pulse_table(chosen._flight).screen("full"), Text(), on_times]
-    why = joined(reasons(compared))
-    warnings = comparison_warnings(compared, tabulated=True)
-    beside = [*warnings, *verdict_notes(judged, chosen), *alternatives(compared)]
-    return Group(
-        *lead,
-        Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]),
-        Text(sentence(f"{chosen.scheme}: {why}")),
-        *(
-            Text(
-                (
-                    f"cheaper: {cheaper.scheme}, {verdicts.spent(cheaper.schedule)}, "
-                    f"{text(cheaper.why)}"
-                ),
-                "dim",
-            )
-            for cheaper in judged.cheaper
-        ),
-        *general,
-        *map(screen_line, ordered(beside)),
-        *(Text(), verdicts.bound_table(judged).screen("screen")),
-        *(Text(), end_facts(chosen)),
-        *results,
+    axis = ", ".join(f"{name} {angle}" for name, angle in angles) + " deg"
+    if MISSING in axis:
+        axis = "along H of t = 0"
+    spin = (
+        ""
+        if requirements.spins_at(spacecraft, final.spin)
+        else f"; spin {final.spin * RPM:.5g} rpm"
     )
+    return f"{axis}{spin}"

@@ -37,18 +37,28 @@ class Topic(NamedTuple):
     @property
     def rows(self) -> list[tuple[str, str]]:
         """Names and texts of all lists and tables."""
-        return ROW.findall(HEADS_OF_TABLE.sub("", self.text))
+        return _rows(self.text)
 
     @property
     def sections(self) -> list[tuple[str, str]]:
         """Headings and the texts below them; the first text has none."""
-        first, *others = HEADING.split(self.text)
-        return [("", first), *zip(others[::2], others[1::2], strict=True)]
+        return _sections(self.text)
 
     @property
     def formulas(self) -> list[str]:
         """Indented lines, as they are."""
         return FORMULA.findall(self.text)
+
+
+@cache  # pages are read for every word that is looked up
+def _rows(text: str) -> list[tuple[str, str]]:
+    return ROW.findall(HEADS_OF_TABLE.sub("", text))
+
+
+@cache
+def _sections(text: str) -> list[tuple[str, str]]:
+    first, *others = HEADING.split(text)
+    return [("", first), *zip(others[::2], others[1::2], strict=True)]
 
 
 ENTRIES = ("schemes", "motion", "equations")  # pages whose sections are topics of their own

@@ -27,8 +27,8 @@ from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, tables
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.decisions import heading
-from nutdamp.views.parts import opening, pulse_table, seconds, summary
+from nutdamp.views.decisions import heading, opening
+from nutdamp.views.parts import pulse_table, seconds, summary
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -437,12 +437,17 @@ HELD = (
         _of_cycle("cycles"),
         lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause",
         "screen",
+        rank=1,
     ),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle("spin_rate", DAY), where=FILES),
-    Column.named("nutation_low_deg=cycle.low", "after firing", "deg", to_figures(3), EVERYWHERE),
-    Column.named("nutation_high_deg=cycle.high", "before firing", "deg", to_figures(3), EVERYWHERE),
     Column.named(
-        "nutation_largest_deg=cycle.largest", Shared.MOST, "deg", to_figures(3), EVERYWHERE
+        "nutation_low_deg=cycle.low", "after firing", "deg", to_figures(3), EVERYWHERE, rank=4
+    ),
+    Column.named(
+        "nutation_high_deg=cycle.high", "before firing", "deg", to_figures(3), EVERYWHERE, rank=3
+    ),
+    Column.named(
+        "nutation_largest_deg=cycle.largest", Shared.MOST, "deg", to_figures(3), EVERYWHERE, rank=2
     ),
     Column(
         "",
@@ -451,6 +456,7 @@ HELD = (
         lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
         to_figures(2),
         "screen",
+        rank=5,
     ),
     *tables.file_columns(FILES, "noise_deg=band.noise", "smallest_pulse_deg=band.step"),
     Column(

@@ -26,7 +26,7 @@ from nutdamp.views.dispersion import CaseRow, StudyOutput, case_row
 from nutdamp.views.loop import described
 from nutdamp.views.parts import named, summary
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
-from nutdamp.views.text import degrees, duration
+from nutdamp.views.text import degrees, duration, screen_line
 from nutdamp.views.tolerances import (
     MAIN,
     MOST_ROWS,
@@ -36,7 +36,6 @@ from nutdamp.views.tolerances import (
     leading,
     size_text,
     unused_notes,
-    unused_table,
 )
 from nutdamp.views.verdict import percent, verdict_json
 
@@ -103,8 +102,7 @@ def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True
             [*notes, *unused_notes(unused)],
             steps,
         )
-    angles = dispersion.angles_note(study.spacecraft)
-    parts: list[RenderableType] = [*head, Text(), percentiles.screen("full"), angles, Text()]
+    parts: list[RenderableType] = [*head, Text(), percentiles.screen("full"), Text()]
     parts += [*_verdicts(flown), *_shares(results)]
     anew = ", ".join(
         f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
@@ -119,7 +117,7 @@ def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True
         parts.append(
             Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
         )
-    return Group(*parts, *unused_table(unused))
+    return Group(*parts, *map(screen_line, unused_notes(unused)))
 
 
 def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:

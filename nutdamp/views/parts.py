@@ -5,36 +5,32 @@ blocks, notes.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from rich.console import Group, RenderableType
-from rich.table import Table
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.text import Text
 
 from nutdamp.common.results import Note
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight, Track, to_sun_pulse
-from nutdamp.physics import attitude
-from nutdamp.planning.plan import NO_NUTATION
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-from nutdamp.units import screen_unit
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
     WIDTH,
     Column,
     DataTable,
+    FittedColumns,
     Shared,
-    facts,
     lines_of,
     to_figures,
 )
@@ -43,16 +39,16 @@ from nutdamp.views.text import (
     WARNING,
     degrees,
     digits,
-    duration,
     fixed,
+    is_detail,
     limit_text,
     longitude,
-    mass,
     moment,
     ordered,
     pointing,
     quantity,
     quiet,
+    rank,
     screen_line,
     severity,
     short_angle,
@@ -88,7 +84,7 @@ def channel_text(pulse: Pulse, spacecraft: Spacecraft) -> str:
 
 def seconds(value: float) -> str:
     """A time within a schedule to a tenth of a millisecond."""
-    return f"{value:.4f}"
+    return fixed(value, 4)
 
 
 def _cone(name: str, when: str, where: str) -> Column:
@@ -237,6 +233,7 @@ def _dated(spacecraft: Spacecraft) -> tuple[Column, ...]:
         lambda row: math.degrees(row.phase) % 360.0,
         lambda angle: fixed(angle, 1, 360.0),
         PEOPLE,
+        rank=1,
     )
     return (columns[0], start, phase, *columns[1:])
 
@@ -292,6 +289,7 @@ BLOCKS = (
         partial(_counts, "delay"),
         where=EVERYWHERE,
         kind=WHOLE,
+        rank=1,
     ),
     Column(
         "delay_deg",
@@ -302,10 +300,17 @@ BLOCKS = (
         ),
         lambda angle: f"{angle:.2f}",
         EVERYWHERE,
+        rank=3,
     ),
-    Column.named("width_s=block.width", "width", "s", to_figures(6), EVERYWHERE),
+    Column.named("width_s=block.width", Shared.ON_TIME, "s", to_figures(6), EVERYWHERE),
     Column(
-        "width_counts", "width", "counts", partial(_counts, "width"), where=EVERYWHERE, kind=WHOLE
+        "width_counts",
+        Shared.ON_TIME,
+        "counts",
+        partial(_counts, "width"),
+        where=EVERYWHERE,
+        kind=WHOLE,
+        rank=2,
     ),
     Column.named("count=block.count", Shared.PULSES, "", where=EVERYWHERE, kind=WHOLE),
     Column.named("every=block.every", Shared.EVERY, "turn", where=EVERYWHERE, kind=WHOLE),
@@ -338,37 +343,22 @@ def block_table(flown: Flight) -> DataTable:
     return DataTable("Command blocks", BLOCKS, rows, flown.schedule)
 
 
-# largest number of pulses of a block on a screen: the first, the last, and evenly some between
-EVENLY = 8
-
-
-def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
-    """The pulses that a screen shows: all, but of long blocks only some."""
-    shown = set[int]()
-    for own in schedule.pulses_by_block:
-        step = max(math.ceil((len(own) - 1) / (EVENLY - 1)), 1)
-        shown |= {*own[::step], own[-1]}
-    # a track may end before the last one
-    rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
-    return replace(table, rows=rows)
-
-
-LINES = 40  # lines of a default screen
-WIDE, FEWEST = 160, 24  # columns where no cell is broken, and lines of the smallest screen there
-NOTES = 3  # notes on it, at most, besides warnings
+LINES = (40, 40)  # of a default screen, and of one narrower than `WIDTH`
+NOTES = 3  # on it, at most, warnings among them
+# rows before the last one, and notes: the first that fits
 SIZES = (
     (14, NOTES),
     (8, NOTES),
+    (6, NOTES),
     (4, NOTES),
+    (2, NOTES),
+    (4, 2),
+    (2, 2),
+    (1, 2),
+    (2, 1),
+    (1, 1),
     (1, 0),
-)  # rows before the last one, and notes: the first that fits
-
-
-def opening(spacecraft: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
-    """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
-    yield from (
-        (named(spacecraft), derived_table(spacecraft), Text()) if verbose else title(spacecraft)
-    )
+)
 
 
 def summary(
@@ -379,109 +369,121 @@ def summary(
     *,
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
+    lines: tuple[int, int] = LINES,
 ) -> RenderableType:
-    """A default screen, warnings below its ``head``, and ``steps`` to take next; ``table`` by its
-    ``first`` rows.
+    """A default screen of at most so many ``lines``: its ``head``, a ``table`` by its ``first``
+    rows, notes, and ``steps`` to take next.
 
     ``verbose``: with all rows and notes, and ``more`` parts.
     """
-    every = ordered(notes)
-    warnings = [screen_line(note) for note in every if severity(note) == WARNING]
-    others = [screen_line(note) for note in every if severity(note) != WARNING]
-    if verbose:
-        body = [Text(), table()] if table is not None else []
-        for part in more:
-            body += [Text(), part]
-        if others:
-            body += [Text(), *others]
-        return Group(*head, *warnings, *body)
-
-    def screen(rows: int, count: int) -> Group:
-        body = [Text(), table(first=rows)] if table is not None else []
-        if quiet():
-            return Group(*head, *warnings, *body)
-        if body:
-            body.append(Text())
-        hidden = f" ({len(others) - count} more)" if len(others) > count else ""
-        last = Text(f"-v all values{hidden} · {steps}", style="dim")
-        return Group(*head, *warnings, *body, *others[:count], last)
-
-    for size in SIZES[:-1]:
-        if lines_of(shown := screen(*size)) <= LINES:
-            return shown
-    shown = screen(*SIZES[-1])
-    if lines_of(shown, width=WIDE) <= FEWEST:
-        return shown
-    dense = [*_dense(shown)]
-    # Steps to take next are what is missed least.
-    return Group(*(dense if lines_of(Group(*dense), width=WIDE) <= FEWEST else dense[:-1]))
+    ranked = sorted(ordered(notes), key=rank)
+    if not verbose:
+        return DefaultScreen(head, table, ranked, steps.split(STEP), lines, silent=quiet())
+    body = [*head]
+    for part in (*([] if table is None else [table()]), *more):
+        body += [Text(), part]
+    return Group(*body, *([Text()] if ranked else []), *map(screen_line, ranked))
 
 
-def _dense(part: RenderableType) -> Iterator[RenderableType]:
-    """Parts of a group without the blank lines between them."""
+STEP = " · "  # between two steps to take next
+
+
+class Clauses:
+    """A line of text that is broken behind commas, where it does not fit and that takes no more
+    lines.
+    """
+
+    def __init__(self, line: Text) -> None:
+        self.line = line
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        width = options.max_width
+        lines = [Text()]
+        for clause in self.line.divide(mark.end() for mark in BREAK.finditer(self.line.plain)):
+            if lines[-1] and len(lines[-1]) + len(clause.plain.rstrip()) > width:
+                lines.append(Text())
+            lines[-1].append_text(clause)
+        whole = lines_of(Group(*lines), width=width) <= lines_of(self.line, width=width)
+        yield from lines if whole else [self.line]
+
+
+BREAK = re.compile("[,;:] ")  # where `Clauses` may be broken
+
+
+class DefaultScreen:
+    """A head, a table, notes in the order of what they change, and steps to take next: as many rows
+    and notes as the lines of a screen hold, which is measured when it is shown.
+    """
+
+    def __init__(
+        self,
+        head: Sequence[RenderableType],
+        table: Callable[..., RenderableType] | None,
+        notes: Sequence[Note],
+        steps: Sequence[str],
+        lines: tuple[int, int],
+        *,
+        silent: bool,
+    ) -> None:
+        self.head = [Clauses(part) if isinstance(part, Text) else part for part in head]
+        self.table, self.steps, self.silent = table, steps, silent
+        self.count, self.lines = len(notes), lines
+        self.notes = [screen_line(entry) for entry in notes if not is_detail(entry)]
+        self.warnings = min(sum(severity(entry) == WARNING for entry in notes), NOTES)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        width = options.max_width
+        most = self.lines[width < WIDTH]
+        sizes = [size for size in SIZES if size[1] >= self.warnings]
+        for make in (lambda parts: parts, _dense):
+            for rows, count in sizes:
+                shown = Group(*make(self._cut(rows, count, width)))
+                if lines_of(shown, width=width) <= most:
+                    yield shown
+                    return
+        yield shown
+
+    def _cut(self, rows: int, count: int, width: int) -> list[RenderableType]:
+        """Parts of the screen with so many rows before the last one, and so many notes."""
+        parts: list[RenderableType] = [*self.head]
+        if self.table is not None:
+            parts += [Text(), self.table(first=rows)]
+        parts = [*_parts(Group(*parts))]
+        for part in parts:
+            if isinstance(part, FittedColumns):
+                part.shortened = True
+        shown = self.notes if self.silent else self.notes[:count]
+        if shown and self.table is not None:
+            parts.append(Text())
+        if self.silent:
+            return [*parts, *shown]
+        hidden = self.count - len(shown)
+        last = "-v all values" + (f" ({hidden} more)" if hidden else "")
+        for step in self.steps:
+            if len(last) + len(STEP) + len(step) <= width:
+                last += STEP + step
+        return [*parts, *shown, Text(last, style="dim")]
+
+
+def _parts(part: RenderableType) -> Iterator[RenderableType]:
+    """Parts of a group, and of groups in it."""
     if isinstance(part, Group):
-        yield from (inner for each in part.renderables for inner in _dense(each))
-    elif not isinstance(part, Text) or part.plain:
+        for each in part.renderables:
+            yield from _parts(each)
+    else:
         yield part
 
 
-def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
-    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change
-    (3,) m/s.
-    """
-    table = block_table(flown)
-    return Group(
-        Text(table.title, style="bold"),
-        table.screen("screen"),
-        Text(),
-        facts(_effects(flown, velocity)),
-    )
+def _dense(parts: Iterable[RenderableType]) -> list[RenderableType]:
+    """Parts without blank lines between them."""
+    return [part for part in parts if not isinstance(part, Text) or part.plain]
 
 
-def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]]:
-    spacecraft, schedule, final = flown.spacecraft, flown.schedule, flown.final
-    before, after = flown.around_pulses()
-    for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
-        start = pulse.loaded[0]
-        dated = spacecraft.utc(start, 3)
-        yield name, f"starts at {moment(start)}" + (f", {dated}" if dated else "")
-    for column in direction_columns(spacecraft):
-        begin, end = map(column.worded, (spacecraft.momentum, final.momentum))
-        yield f"H: {column.heading}", f"{begin} to {end}"
-    assert spacecraft.sun is not None
-    aspects = (
-        attitude.angle_between(momentum, spacecraft.sun)
-        for momentum in (spacecraft.momentum, final.momentum)
-    )
-    yield "Sun angle of H", " to ".join(degrees(float(angle)) for angle in aspects)
-    yield "spin", f"{spin_text(spacecraft.spin)} to {spin_text(final.spin)}"
-    largest = float(max(before.nutation.max(), after.nutation.max()))
-    yield (
-        "nutation",
-        f"{degrees(spacecraft.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}",
-    )
-    used = schedule.propellant
-    tank = spacecraft.tank
-    spent = mass(schedule.propellant)
-    if used is not None and tank is not None:
-        spent += f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
-    if used is not None and spacecraft.mass is not None:
-        masses = (spacecraft.mass, spacecraft.mass - used)
-        spent += "; mass " + " to ".join(quantity(mass_, "kg", 6) for mass_ in masses)
-    yield "propellant", spent
-    if velocity is not None:
-        yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")
-
-
-def title(spacecraft: Spacecraft) -> list[Text]:
-    """Name of a spacecraft and its motion at t = 0, on one line where they fit."""
-    what = (
-        f"{spacecraft.inertia.shape}, {spacecraft.spin * RPM:.4g} rpm, "
-        f"nutation {short_angle(spacecraft.widest.nutation)} deg"
-    )
-    name = named(spacecraft)
-    fits = len(name) + len(what) + 3 <= WIDTH
-    return [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
+def title(spacecraft: Spacecraft) -> Text:
+    """Name of a spacecraft and its motion at t = 0."""
+    nutation = short_angle(spacecraft.widest.nutation)
+    spin = f"{spacecraft.spin * RPM:.4g} rpm"
+    return named(spacecraft, f"   {spacecraft.inertia.shape}, {spin}, nutation {nutation} deg")
 
 
 def named(spacecraft: Spacecraft, *more: str | tuple[str, str]) -> Text:
@@ -583,70 +585,6 @@ def required(spacecraft: Spacecraft) -> str:
     return listed(texts)
 
 
-def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
-    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
-    from nutdamp.flight.cones import at_start
-
-    return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
-
-
-def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    inertia = spacecraft.inertia
-    motion = spacecraft.widest
-    moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
-    yield "inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}"
-    if not inertia.symmetric:
-        unit, factor = screen_unit("kg m²")
-        first, second, _ = factor * np.asarray(inertia.moments)
-        yield (
-            "",
-            f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; schemes but optimal plan on their mean",
-        )
-    if inertia.wheel:
-        whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
-        yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
-    reversed_ = ": the spin axis is body axis -3" if spacecraft.sense < 0.0 else ""
-    yield "spin", f"{spin_text(spacecraft.spin)}{reversed_}"
-    now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
-    cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
-    yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
-    period = spacecraft.motion_period
-    still = math.isinf(period)
-    in_body = (
-        "none in the body, where ω does not turn" if still else f"{duration(period)} in the body"
-    )
-    yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
-    if spacecraft.dissipation is not None:
-        yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
-    # Causes that break the floors A|ω0| and C|ω3|β.
-    unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
-    beyond = " and ".join([*unequal, *changing(spacecraft)])
-    floor = f"no least impulse with {beyond}" if beyond else "lower bound"
-    name = "impulse" if beyond else "least impulse"
-    yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
-    if spacecraft.goal.axis is not None:
-        symbol = "|H3|β" if inertia.wheel else "C|ω3|β"
-        turned = spacecraft.to_turn < NO_NUTATION  # but for rounding
-        turn = quantity(0.0 if turned else spacecraft.turning_impulse, "N m s")
-        bound = "" if beyond else ", the least to turn H"
-        yield "target", target_text(spacecraft)
-        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {symbol} = {turn}{bound}"
-    if spacecraft.goal.spin is not None:
-        yield "final spin", spin_text(spacecraft.goal.spin)
-    actuators = []
-    torquer = spacecraft.torquer
-    if torquer is not None:
-        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
-        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
-        actuators.append(f"steerable torquer, {strength}{assumed}")
-    if spacecraft.channels:
-        actuators.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
-    yield "actuators", "; ".join(actuators)
-    bounds = required(spacecraft)
-    if bounds:
-        yield "requirement", bounds
-
-
 def changing(spacecraft: Spacecraft) -> list[str]:
     """Causes that change the motion while nothing fires."""
     causes = []
@@ -655,15 +593,3 @@ def changing(spacecraft: Spacecraft) -> list[str]:
     if spacecraft.disturbances:
         causes.append("disturbances")
     return causes
-
-
-def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
-    """Effect of energy dissipation on the nutation,
-    and a note where it is too fast for its model.
-    """
-    if spacecraft.growth == 0.0:
-        return "none: a sphere has no energy to lose"
-    what = "grows" if spacecraft.growth > 0.0 else "decays"
-    slow = time_constant >= spacecraft.inertial_period
-    rough = "" if slow else "; less than one inertial period: results are rough"
-    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"

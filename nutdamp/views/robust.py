@@ -1,5 +1,5 @@
-"""Results of ``plan --robust``: candidates by the share of cases that comply, the plan to fly and
-its cost.
+"""All values of ``plan``; and of ``plan --robust`` candidates by the share of cases that comply,
+the plan to fly and its cost.
 """
 
 from __future__ import annotations
@@ -13,25 +13,78 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
+from nutdamp.planning.decision import Comparison
+from nutdamp.planning.notes import (
+    alternatives,
+    comparison_warnings,
+    plan_notes,
+    reasons,
+    spacecraft_notes,
+    verdict_notes,
+)
 from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
 from nutdamp.planning.screening import FlownPlan
 from nutdamp.spacecraft import requirements
-from nutdamp.views.decisions import final_json, plan_json, target_json
-from nutdamp.views.glance import comparison_screen
+from nutdamp.views import verdict as verdicts
+from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
+from nutdamp.views.glance import end_facts, headline, scheme_table
+from nutdamp.views.parts import named, pulse_table
+from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
     TEXT,
     Column,
     DataTable,
     Shared,
+    facts,
     file_columns,
     to_figures,
     values_of,
 )
-from nutdamp.views.text import joined, note_json, screen_line, small_angle
+from nutdamp.views.text import (
+    joined,
+    note_json,
+    ordered,
+    rank,
+    screen_line,
+    sentence,
+    small_angle,
+    text,
+)
 from nutdamp.views.tolerances import in_words, stated_text
 from nutdamp.views.verdict import cases_json, exact_percent, percent, share_text
 
 MOST_ROWS = 12  # largest number of candidates in the table
+
+
+def comparison_screen(compared: Comparison) -> RenderableType:
+    """All tables of ``plan``, the verdict on top and the notes last."""
+    judged, chosen = compared.verdict, compared.recommended
+    head: list[RenderableType] = [named(compared.spacecraft), headline(compared)]
+    tables: list[RenderableType] = []
+    notes = [*spacecraft_notes(compared.spacecraft)]
+    if chosen is not None:
+        head.append(Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]))
+        head.append(Text(sentence(f"{chosen.scheme}: {joined(reasons(compared))}")))
+        for cheaper in judged.cheaper:
+            spent = verdicts.spent(cheaper.schedule)
+            head.append(Text(f"cheaper: {cheaper.scheme}, {spent}, {text(cheaper.why)}", "dim"))
+        tables = [verdicts.bound_table(judged).screen("screen"), end_facts(chosen)]
+        notes = [*comparison_warnings(compared, tabulated=True), *notes]
+        notes += [*verdict_notes(judged, chosen), *alternatives(compared)]
+    tables.append(derived_table(compared.spacecraft))
+    tables.append(scheme_table(compared, chosen).transposed("full"))
+    if chosen is not None and chosen.pulses.blocks:
+        tables.append(Group(*blocks_screen(chosen)))
+    elif chosen is not None and len(chosen.pulses):
+        totals: dict[str, float] = {}
+        for pulse in chosen.pulses:
+            totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
+        on_times = ((f"on-time of {name}", f"{total:.4f} s") for name, total in totals.items())
+        tables += [pulse_table(chosen._flight).screen("full"), facts(on_times)]
+    notes += [note for plan in compared.plans for note in plan_notes(plan)]
+    spaced = [part for table in tables for part in (Text(), table)]
+    lines = [*map(screen_line, sorted(ordered(notes), key=rank))]
+    return Group(*head, *spaced, *([Text()] if lines else []), *lines)
 
 
 def robust_screen(robust: RobustComparison) -> RenderableType:
@@ -176,20 +229,8 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named += [
         entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named
     ]
-    rest = len(robust.candidates) - len(named)
-    level = exact_percent(robust.probability)
-    free = robust.comparison.spacecraft.goal.axis is None
-    residual = "nutation" if free else "nutation or axis error"
-    notes = [] if not rest else [f"Plans that rank below these: {rest}."]
-    if any(not entry.final for entry in robust.candidates):
-        notes.append("Losing plans stopped early.")
-    notes.append(
-        f"nominal, {level}: the {residual} left with nominal values, "
-        "and not exceeded in so many cases."
-    )
-    if robust.usual is not None:
-        notes.append("* is recommended without --robust.")
-    return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
+    below = f"Plans below these: {len(robust.candidates) - len(named)}; * without --robust."
+    return [_table(robust, named).screen("full"), Text(below, style="dim")]
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:

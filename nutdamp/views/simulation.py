@@ -9,7 +9,8 @@ and in each ∫ω3 dt grows by 2π.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -25,8 +26,9 @@ from nutdamp.flight.cones import aspects
 from nutdamp.flight.end_state import LEGENDRE
 from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
-from nutdamp.physics.attitude import full_turn
+from nutdamp.physics.attitude import angle_between, full_turn
 from nutdamp.planning.notes import TELLING, verdict_notes
+from nutdamp.planning.plan import Plan
 from nutdamp.planning.simulation import Simulation, Verified, model_warnings
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -46,9 +48,10 @@ from nutdamp.views.tables import (
 )
 from nutdamp.views.text import (
     degrees,
-    longitude,
+    mass,
     moment,
-    pointing,
+    ordered,
+    quantity,
     screen_line,
     small_angle,
 )
@@ -87,16 +90,17 @@ def _end_table(simulation: Simulation) -> DataTable:
     return DataTable("", columns, (simulation.impulses, simulation.flown))
 
 
-def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
-    """The screen of ``simulate``."""
+def simulation_screen(
+    simulation: Simulation, *, verbose: bool = True, planned: Sequence[Note] = ()
+) -> RenderableType:
+    """The screen of ``simulate``; ``planned``: notes on the plan that it flies."""
     judged, extremes = simulation.verdict, simulation.extremes
     spacecraft = simulation.flown.spacecraft
     pulses = simulation.flown.schedule
     fired = verdicts.fired(pulses) if len(pulses) else "no pulse"
-    track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
-    headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
+    headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}")
     head = [
-        *parts.opening(spacecraft, verbose),
+        *decisions.opening(spacecraft, verbose),
         headline,
         verdicts.coloured(*verdicts.stated(judged)),
     ]
@@ -105,7 +109,7 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
     return parts.summary(
         head,
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
-        _notes(simulation),
+        [*_notes(simulation), *planned],
         "--csv track.csv · --plot motion.png · nutdamp verify",
         more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
@@ -140,9 +144,9 @@ def _notes(simulation: Simulation) -> Iterator[Note]:
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     flight, schedule = simulation.shown, simulation.shown.schedule
     if schedule.blocks:
-        yield parts.blocks_screen(flight, simulation.plan._delta_v)
+        yield from blocks_screen(simulation.plan)
     if len(schedule):
-        shown = parts.shown_rows(parts.pulse_table(flight), schedule)
+        shown = shown_rows(parts.pulse_table(flight), schedule)
         yield shown.screen("simulate")
         if len(shown.rows) < len(schedule):
             yield Text(
@@ -150,25 +154,52 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
             )
 
 
+def blocks_screen(plan: Plan) -> Iterator[RenderableType]:
+    """The command blocks of a plan, and what an operator compares before and after them."""
+    table = parts.block_table(plan._flight)
+    yield Text(table.title, style="bold")
+    yield table.screen("screen")
+    yield Text()
+    yield facts(_effects(plan))
+
+
+def _effects(plan: Plan) -> Iterator[tuple[str, str]]:
+    spacecraft, final = plan.spacecraft, plan._flight.final
+    for column in parts.direction_columns(spacecraft):
+        begin, end = map(column.worded, (spacecraft.momentum, final.momentum))
+        yield f"H: {column.heading}", f"{begin} to {end}"
+    if spacecraft.sun is not None:
+        sides = (spacecraft.momentum, final.momentum)
+        angles = (degrees(float(angle_between(side, spacecraft.sun))) for side in sides)
+        yield "Sun angle of H", " to ".join(angles)
+    yield Shared.SPIN, f"{parts.spin_text(spacecraft.spin)} to {parts.spin_text(final.spin)}"
+    used, tank = plan.pulses.propellant, spacecraft.tank
+    left = "" if used is None or tank is None else f"; {mass(tank.propellant - used)} left"
+    yield Shared.PROPELLANT, f"{verdicts.spent(plan.pulses)}{left}"
+    if plan._delta_v is not None:
+        yield "|ΔV|", quantity(float(np.linalg.norm(plan._delta_v)), "m/s")
+
+
+# largest number of pulses of a block on a screen: the first, the last, and evenly some between
+EVENLY = 8
+
+
+def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
+    """The pulses that a screen shows: all, but of long blocks only some."""
+    shown = set[int]()
+    for own in schedule.pulses_by_block:
+        step = max(math.ceil((len(own) - 1) / (EVENLY - 1)), 1)
+        shown |= {*own[::step], own[-1]}
+    # a track may end before the last one
+    rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
+    return replace(table, rows=rows)
+
+
 def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
-    extremes, spacecraft = simulation.extremes, simulation.shown.spacecraft
-    yield (
-        "spin axis in x, in y",
-        f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame",
-    )
-    if spacecraft.attitude is not None:
-        frame = spacecraft.attitude.frame or "the frame of the file"
-        around, above = parts.direction_columns(spacecraft)
-        west, east = (longitude(math.degrees(angle)) for angle in extremes.right_ascension)
-        yield around.heading, f"{west} to {east} deg in {frame}, from its axis x towards y"
-        yield above.heading, _range(extremes.declination)
+    extremes = simulation.extremes
     yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
-    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
-
-
-def _range(values: tuple[float, float]) -> str:
-    low, high = (pointing(math.degrees(angle)) for angle in values)
-    return f"{low} to {high} deg"
+    model = simulation.shown.model
+    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}, by the {model}"
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
@@ -277,7 +308,7 @@ def spin_table(spacecraft: Spacecraft, schedule: Schedule, until: float) -> str:
     last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
     if last * abs(spacecraft.spin) > 2.0 * math.pi * MOST_SPINS:
         raise BadRequest(
-            f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)"
+            f"the table would have more than {MOST_SPINS} turns; choose an earlier end (until)"
         )
     first, begins = _begins(spacecraft, schedule, last)
     ends = begins[1:]
@@ -308,7 +339,7 @@ def _begins(spacecraft: Spacecraft, schedule: Schedule, last: float) -> tuple[in
     from nutdamp.schemes.block_model import spin_turn, sun_pulses
 
     if spacecraft.spin == 0.0:
-        raise BadRequest("a table of spins needs a body that spins")
+        raise BadRequest("a table of turns needs a body that spins")
     turn = spin_turn(spacecraft)
     until = last + 3.0 * turn
     for _ in range(2):  # where the spin falls, turns get longer
@@ -374,14 +405,18 @@ BUDGET_NOTE = (  # note on `budget_table`
 )
 
 
-def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
-    """The screen of ``verify``: verdict, methods, and what each imperfection leaves."""
+def verification_screen(
+    verified: Verified, *, verbose: bool, planned: Sequence[Note] = ()
+) -> RenderableType:
+    """The screen of ``verify``: verdict, methods, and what each imperfection leaves; ``planned``:
+    notes on the plan that it flies.
+    """
     plan, verification = verified.plan, verified.core
     spacecraft, judged = plan.spacecraft, plan.verdict
     confirmed = Light.GREEN if verification.agree else Light.RED
     lead, about = verdicts.headline(judged)
     head = [
-        parts.named(spacecraft, f": {plan.scheme}; Δ: maximum difference from the flown motion"),
+        parts.named(spacecraft, f": {plan.scheme}"),
         verdicts.coloured(verdict(verification), confirmed),
         Text.assemble((lead, verdicts.STYLES[judged.light]), about),
         verdicts.coloured(verdicts.statement(judged), judged.light),
@@ -395,11 +430,12 @@ def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
     if verbose:
         return Group(
             *head,
-            *(Text(), parts.derived_table(spacecraft)),
+            *(Text(), decisions.derived_table(spacecraft)),
             *(Text(), methods),
-            *(Text(), *map(screen_line, (*missing, conservation(verification)))),
             *(Text(), Text(BUDGET, "bold"), Text()),
             *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
+            Text(),
+            *map(screen_line, ordered((*missing, conservation(verification), *planned))),
         )
     notes = [conservation(verification)]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
@@ -413,7 +449,9 @@ def verification_screen(verified: Verified, *, verbose: bool) -> RenderableType:
     if worst is not None and worst.nutation - verification.budget[0].nutation > SHOWN:
         angle = math.degrees(worst.nutation)
         notes.append(note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
-    return parts.summary(head, lambda **_: methods, [*notes, *missing], "--json verified.json")
+    return parts.summary(
+        head, lambda **_: methods, [*notes, *missing, *planned], "--json verified.json"
+    )
 
 
 def verification_json(verified: Verified) -> dict[str, Any]:
@@ -437,24 +475,29 @@ def verification_json(verified: Verified) -> dict[str, Any]:
 
 
 def _difference(value: float) -> str:
-    if value == 0.0:
-        return "0"
-    return "< 1e-12" if value < 1e-12 else f"{value:.1e}"
+    return f"{value:.1e}" if value >= 1e-12 else "0"  # less is rounding
 
 
 NUTATION = Column.named("nutation_deg", Part.NUTATION.label, "deg", small_angle, "json screen")
 METHODS = (
     Column.named("name", "method", "", where="json screen", kind=TEXT),
     NUTATION,
-    Column.named("momentum_shift_deg", Part.SHIFT.label, "deg", small_angle, "json screen"),
+    Column.named("momentum_shift_deg", Part.SHIFT.label, "deg", small_angle, "json screen", rank=1),
     Column.named("axis_difference_rad=axis", "Δaxis", "rad", _difference, "json screen"),
     Column.named("momentum_difference_rad=momentum", "ΔH", "rad", _difference, "json screen"),
-    Column.named("rate_difference=rate", "Δrates", "relative", _difference, "json screen"),
+    Column.named("rate_difference=rate", "Δrates", "relative", _difference, "json screen", rank=2),
     Column.named("result_difference=result", "", "", where="json"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )
 IMPERFECTIONS = (
-    Column.named("imperfection=name", "imperfection", "", where="json screen", kind=TEXT),
+    Column.named(
+        "imperfection=name",
+        "imperfection",
+        "",
+        where="json screen",
+        kind=TEXT,
+        words=lambda row: row.name.replace("pulse width", Shared.ON_TIME),
+    ),
     NUTATION,
     *tables.file_columns("json", "momentum_shift_deg"),
     Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",

@@ -10,22 +10,26 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
-from rich.padding import Padding
+from rich.console import (
+    Console,
+    ConsoleOptions,
+    JustifyMethod,
+    RenderableType,
+    RenderResult,
+)
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.numerics import MISSING
 from nutdamp.units import screen_unit
 
-NARROW = 60  # characters below which a table becomes one block a row
 GAPS = (2, 1)  # characters between two columns, and where there is little room
 WORD = re.compile(
     r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?"
@@ -75,80 +79,101 @@ class Shared:
     VERDICT = "verdict"
 
 
-EMPTY = ("", MISSING)  # cells that need no line of their own in a block
-
-
-SHORT = 12  # characters of a verdict that stays on one line: "NOT met" does, a reason need not
-
-
 class FittedColumns(Table):
-    """A table of numbers; where the screen is too narrow to show them whole, each row is a block of
-    its own.
+    """A table with a line a row, however narrow the screen is.
+
+    Where its columns do not fit side by side, those with a rank are left out if it may be
+    ``shortened``, the largest rank first. What still does not fit goes on below, beside the first
+    column again.
     """
 
-    whole: tuple[str, ...] = ()
-    """Headings of columns whose cells stay on one line."""
+    ranks: tuple[int, ...] = ()
+    shortened = False
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        every, room = list(self.columns), options.max_width
         texts = [
-            [str(column.header), *(_cell(cell).plain for cell in column.cells)]
-            for column in self.columns
+            [str(column.header), *(_cell(cell).plain for cell in column.cells)] for column in every
         ]
-        unbroken = [str(column.header) in self.whole for column in self.columns]
-        for gap in GAPS if options.max_width >= NARROW else ():
-            widths = _widths(texts, options.max_width - gap * (len(self.columns) - 1), unbroken)
-            if widths is not None:
-                self.padding = (0, gap, 0, 0)
-                for column, width in zip(self.columns, widths, strict=True):
-                    column.width = width
-                yield from super().__rich_console__(console, options)
-                return
-        yield from self._blocks()
-
-    def _blocks(self) -> RenderResult:
-        names = [str(column.header).replace("\n", ", ").strip(", ") for column in self.columns]
-        for row in zip(*(column.cells for column in self.columns), strict=True):
-            first, *others = map(_cell, row)
-            if first.plain.strip():
-                named = f"{names[0]}:" if " " in names[0] else names[0]
-                yield Text(f"{named} {first.plain.strip()}".strip(), style="bold")
-            rows = [
-                (name, cell)
-                for name, cell in zip(names[1:], others, strict=True)
-                if cell.plain.strip() not in EMPTY
+        first, *others = range(len(every))
+        while self.shortened and not _fitted(
+            [texts[at] for at in (first, *others)], room, rows=True
+        ):
+            ranked = max(others, key=self.ranks.__getitem__, default=first)
+            if not self.ranks[ranked]:
+                break
+            others.remove(ranked)
+        below = False
+        while others or not below:
+            count = len(others)
+            while count > 1 and not _fitted(
+                [texts[at] for at in (first, *others[:count])], room, rows=False
+            ):
+                count -= 1
+            part = [first, *others[:count]]
+            others = others[count:]
+            widths, gap = _fitted([texts[at] for at in part], room, rows=False) or (
+                [None] * len(part),
+                1,
+            )
+            self.columns = [
+                replace(every[at], width=width, _index=place)  # by it rich finds the last one
+                for place, (at, width) in enumerate(zip(part, widths, strict=False))
             ]
-            if rows:
-                yield Padding(facts(rows), (0, 0, 0, 2))
+            self.padding = (0, gap, 0, 0)
+            if below:
+                yield Text()
+            yield from super().__rich_console__(console, options)
+            below = True
+        self.columns = every
 
 
 def _cell(cell: RenderableType) -> Text:
     return cell if isinstance(cell, Text) else Text(str(cell))
 
 
-def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[int] | None:
-    """Characters for each column such that no word and no cell of ``unbroken`` ones is cut; None
-    without ``room``.
+def _fitted(
+    columns: list[list[str]], room: int, *, rows: bool
+) -> tuple[Sequence[int | None], int] | None:
+    """Characters for each column, and between two; None without ``room``.
+
+    The gap narrows before headings take two lines; then words are what stays whole, unless all
+    ``rows`` do.
     """
-    words = [
-        max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0)
-        for texts in columns
-    ]
     whole = [_longest(texts) for texts in columns]
-    rows = [_longest(texts[1:]) for texts in columns]
-    widths = [
-        line if keep else word for word, line, keep in zip(words, whole, unbroken, strict=True)
-    ]
-    spare = room - sum(widths)
-    if spare < 0:
-        return None
-    # Names of rows are widened first, then reasons, which stand last.
-    order = (0, *range(len(widths) - 1, 0, -1))
-    for wanted in (rows, whole):  # a heading is broken before a row is
-        for at in order:
-            wider = max(min(wanted[at] - widths[at], spare), 0)
-            widths[at] += wider
-            spare -= wider
+    lines = [max(_longest(texts[1:]), _on_two_lines(texts[0])) for texts in columns]
+    words = [_longest_word(texts) for texts in columns]
+    for least in (whole, lines) if rows else (whole, lines, words):
+        for gap in GAPS:
+            spare = room - sum(least) - gap * (len(columns) - 1)
+            if spare >= 0:
+                return _widened(least, (lines, whole), spare), gap
+    return None
+
+
+def _widened(least: list[int], wanted: Iterable[list[int]], spare: int) -> list[int]:
+    """Widths with the ``spare`` characters shared out: names of rows first, then what stands last,
+    such as reasons.
+    """
+    widths = list(least)
+    for wider in wanted:
+        for at in (0, *range(len(widths) - 1, 0, -1)):
+            more = max(min(wider[at] - widths[at], spare), 0)
+            widths[at] += more
+            spare -= more
     return widths
+
+
+def _on_two_lines(heading: str) -> int:
+    """Characters that a heading takes on two lines."""
+    words = heading.split(" ")
+    halves = ((" ".join(words[:at]), " ".join(words[at:])) for at in range(1, len(words) + 1))
+    return min(map(_longest, map(list, halves)))
+
+
+def _longest_word(texts: list[str]) -> int:
+    """Characters of the longest word."""
+    return max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0)
 
 
 def _longest(texts: list[str]) -> int:
@@ -162,7 +187,9 @@ def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
     """
     table = FittedColumns(box=None, pad_edge=False, header_style="bold")
     for index, name in enumerate(names):
-        table.add_column(name, justify="left" if index == 0 or name in text else "right")
+        justify: JustifyMethod = "left" if index == 0 or name in text else "right"
+        table.add_column(name, justify=justify, overflow="fold")
+    table.ranks = (0,) * len(names)
     return table
 
 
@@ -225,7 +252,8 @@ class Column(NamedTuple):
     without a key; None where it is not known. ``text``: the value as people read it, in the unit of
     screens; ``words``: where that takes more than the value, the text of a row. ``where``: the
     places that have the column, separated by blanks. ``when``: tables that have it, by their
-    source, else all. ``met``: whether a requirement is met, where a verdict is coloured.
+    source, else all. ``met``: whether a requirement is met, where a verdict is coloured. ``rank``:
+    default screens that are too narrow leave the column out, the largest rank first; 0: never.
     """
 
     key: str
@@ -238,6 +266,7 @@ class Column(NamedTuple):
     kind: str = REAL
     met: Callable[[Any], bool | None] | None = None
     words: Callable[[Any], str | None] | None = None
+    rank: int = 0
 
     @classmethod
     def named(
@@ -313,7 +342,7 @@ class DataTable:
         shown = self.at(place)
         return tuple(tuple(column.shown(row) for column in shown) for row in self.rows)
 
-    def screen(self, place: str, *, between: str = "\n", first: int | None = None) -> FittedColumns:
+    def screen(self, place: str, *, between: str = " ", first: int | None = None) -> FittedColumns:
         """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones
         and the last.
         """
@@ -321,10 +350,7 @@ class DataTable:
         headed = [(column.headed(between), column) for column in shown]
         text = tuple(name for name, column in headed if column.kind == TEXT)
         table = columns(*(name for name, _ in headed), text=text)
-        cells = {name: list(map(column.shown, self.rows)) for name, column in headed if column.met}
-        table.whole = tuple(
-            name for name, texts in cells.items() if max(map(len, texts), default=0) <= SHORT
-        )
+        table.ranks = tuple(column.rank for column in shown)
         last = len(self.rows) - 1
         cut = last if first is None or last < first + 2 else first
         for index, row in enumerate(self.rows):
@@ -333,11 +359,7 @@ class DataTable:
                     *(self._cell(column, row, index, at == 0) for at, column in enumerate(shown))
                 )
             elif index == cut:
-                more = next(
-                    (at for at, column in enumerate(shown) if at and column.kind == TEXT), 1
-                )
-                left_out = {0: "…", more: f"{last - cut} more"}
-                table.add_row(*(left_out.get(at, "") for at in range(len(shown))))
+                table.add_row(f"… {last - cut} more")
         return table
 
     def _cell(self, column: Column, row: Any, index: int, first: bool) -> Text:

@@ -66,24 +66,21 @@ def sentence(clause: str) -> str:
 
 
 def degrees(angle: float | None) -> str:
-    """An angle given in rad, in degrees; one below 1e-9 deg is rounding and shown as such."""
+    """An angle given in rad, in degrees; one below `ROUNDING` is 0."""
     if angle is None or math.isnan(angle):
         return MISSING
     shown = math.degrees(angle)
-    if abs(shown) < 1e-9:
-        return "< 1e-9 deg" if shown != 0.0 else "0 deg"
-    return f"{shown:.4g} deg"
+    return f"{shown:.4g} deg" if abs(shown) >= ROUNDING else "0 deg"
+
+
+ROUNDING = 1e-9
+"""Degrees below which an angle is rounding of the arithmetic: that of an hour of flight, 1e-11 rad.
+"""
 
 
 def small_angle(angle: float) -> str:
-    """An angle given in degrees, without the unit and with final zeros; below 1e-9 deg it is shown
-    as rounding.
-    """
-    return (
-        digits(angle, 4)
-        if abs(angle) >= 1e-9
-        else degrees(math.radians(angle)).removesuffix(" deg")
-    )
+    """An angle given in degrees, without the unit and with final zeros; 0 below `ROUNDING`."""
+    return digits(angle, 4) if abs(angle) >= ROUNDING else "0"
 
 
 FINE = 0.01  # share of a limit below which what is left of it is shown as 0
@@ -151,7 +148,7 @@ def lasting(value: float | None) -> str:
 
 def moment(value: float) -> str:
     """A point in time given in s, to the millisecond."""
-    return f"{value:.3f} s"
+    return f"{fixed(value, 3)} s"
 
 
 def vector(components: Iterable[float]) -> str:
@@ -177,10 +174,9 @@ def steering(impulse: Sequence[float]) -> str:
 
 
 def fixed(value: float, digits: int, period: float = math.inf) -> str:
-    """A number with so many decimals, without -0; one that rounds up to ``period`` is 0."""
+    """A number with so many decimals; one that rounds to 0, or up to ``period``, is 0."""
     rounded = round(value, digits)
-    turned = 0.0 if rounded >= period else rounded + 0.0
-    return f"{turned:.{digits}f}"
+    return f"{rounded:.{digits}f}" if 0.0 != rounded < period else "0"
 
 
 WARNING, NOTE, REASON = "warning", "note", "reason"
@@ -191,6 +187,7 @@ INSTEAD = re.compile(r"\{(\w+)\} instead of \{(than_\1)\}")
 UNITS: dict[
     str, Callable[[float], str]
 ] = {  # texts of values by the end of their names, the first that fits
+    "limit_deg": lambda value: limit_text(math.radians(value)),
     "_deg": lambda value: degrees(math.radians(value)),
     "_rad_s": lambda value: quantity(value, "rad/s"),
     "lasting_s": lasting,
@@ -204,17 +201,19 @@ UNITS: dict[
 
 
 class NoteEntry(NamedTuple):
-    """A code of the catalogue: its severity, its sentence with names of values in braces, and what
-    it means.
+    """A code of the catalogue: its severity, its ``rank`` among notes if any, its sentence with
+    names of values in braces, and what it means.
     """
 
     severity: str
+    rank: str
     sentence: str
     paragraph: str
 
 
 NOTE_ENTRY = re.compile(
-    r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL
+    r"^## (\S+) \((\w+)(?:, (\w+))?\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)",
+    re.MULTILINE | re.DOTALL,
 )
 
 
@@ -223,14 +222,31 @@ def note_entries() -> dict[str, NoteEntry]:
     """All codes of the catalogue."""
     entries = NOTE_ENTRY.findall(CATALOGUE.read_text(encoding="utf-8"))
     return {
-        code: NoteEntry(severity, " ".join(quoted[2:-1].split("\n> ")), " ".join(paragraph.split()))
-        for code, severity, quoted, paragraph in entries
+        code: NoteEntry(
+            severity, rank, " ".join(quoted[2:-1].split("\n> ")), " ".join(paragraph.split())
+        )
+        for code, severity, rank, quoted, paragraph in entries
     }
 
 
 def severity(note: Note) -> str:
     """Severity of a note."""
     return note_entries()[note.code].severity
+
+
+CHOICE, DETAIL = "choice", "detail"
+"""Ranks of notes: one that may change the choice of a plan; one for screens with all values."""
+
+
+def rank(note: Note) -> int:
+    """Place of a note among others by what it changes: warnings, then choices, details last."""
+    entry = note_entries()[note.code]
+    return [entry.severity == WARNING, entry.rank == CHOICE, entry.rank != DETAIL, True].index(True)
+
+
+def is_detail(note: Note) -> bool:
+    """True for a note that default screens leave out."""
+    return note_entries()[note.code].rank == DETAIL
 
 
 def text(note: Note) -> str:

@@ -20,7 +20,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
-from nutdamp.views.tables import REAL, TEXT, Column, DataTable, FittedColumns, Shared, facts
+from nutdamp.views.tables import REAL, TEXT, Column, DataTable, FittedColumns, Shared
 from nutdamp.views.text import quantity
 
 SHOWN = {  # units for people of those of inputs, and the factor
@@ -120,13 +120,13 @@ def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:
         yield note("main-causes", part=part, causes=", ".join(causes or [ranked[0][0]]))
 
 
-def unused_notes(unused: Sequence[Unused]) -> Iterator[Note]:
-    """Dispersions of the file that change nothing."""
-    if unused:
-        yield note(
-            "dispersions-without-effect",
-            dispersions=", ".join(in_words(entry.name) for entry in unused),
-        )
+def unused_notes(unused: Iterable[Unused]) -> Iterator[Note]:
+    """Dispersions of the file that change nothing, and why; those that share a reason together."""
+    reasons: dict[str, list[str]] = {}
+    for name, reason in unused:
+        reasons.setdefault(reason, []).append(in_words(name))
+    for reason, names in reasons.items():
+        yield note("dispersions-unused", dispersions=", ".join(names), why=reason)
 
 
 def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
@@ -172,20 +172,6 @@ def inputs_table(drawn: Sequence[DispersedInput], draws: Mapping[str, float]) ->
 def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
     """The unit of an input for people, and the factor to it."""
     return screen_unit(*SHOWN.get(entry.unit, (entry.unit, 1.0)))
-
-
-def unused_table(unused: Iterable[Unused]) -> list[RenderableType]:
-    """Inputs without effect under their heading; nothing where there are none."""
-    rows = list(without_effect(unused))
-    return [Text(), Text("Unused dispersions", style="bold"), facts(rows)] if rows else []
-
-
-def without_effect(unused: Iterable[Unused]) -> Iterator[tuple[str, str]]:
-    """Inputs without effect and the reasons; names that share a reason are listed together."""
-    reasons: dict[str, list[str]] = {}
-    for name, reason in unused:
-        reasons.setdefault(reason, []).append(in_words(name))
-    return ((", ".join(names), reason) for reason, names in reasons.items())
 
 
 def in_words(name: str) -> str:

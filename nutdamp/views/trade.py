@@ -25,8 +25,8 @@ from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.decisions import heading, plan_json
-from nutdamp.views.parts import derived_table, named, pulse_table, requested, summary
+from nutdamp.views.decisions import derived_table, heading, plan_json
+from nutdamp.views.parts import named, pulse_table, requested, summary
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -101,7 +101,9 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
 
     columns = [
         Column.named("point=number", "point", "", where=everywhere, kind=WHOLE),
-        Column.named("shift_allowed_deg=front.shift", "H within", "deg", within, "csv brief"),
+        Column.named(
+            "shift_allowed_deg=front.shift", "H within", "deg", within, "csv brief", rank=2
+        ),
         Column.named("end_s=pulses.end", Shared.END, "s", "{:.3f}".format, everywhere),
         Column("", "cost", "", lambda row: row.spent(row.point.cost), where=shown),
         Column(
@@ -111,7 +113,7 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             lambda row: row.spent(row.bound),
             where="full" if bounded else "",
         ),
-        Column("pulses", Shared.PULSES, "", count, where=everywhere, kind=WHOLE),
+        Column("pulses", Shared.PULSES, "", count, where=everywhere, kind=WHOLE, rank=4),
         *file_columns(
             "csv",
             "propellant_kg=pulses.propellant",
@@ -126,10 +128,11 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             "deg",
             small_angle,
             everywhere,
+            rank=1,
         ),
         *file_columns("csv", "axis_error_deg=residual.axis_error"),
         Column("", f"vs point {first}", "%", _saved, where="full"),
-        Column("", "vs first", "%", _saved, where="" if others else "brief"),
+        Column("", "vs first", "%", _saved, where="" if others else "brief", rank=3),
         Column.named(
             "scheme=point.plan.scheme",
             Shared.SCHEME,

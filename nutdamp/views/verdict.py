@@ -6,7 +6,6 @@ All screens, pages, figures and files take these; no other module has a word for
 from __future__ import annotations
 
 import math
-from itertools import groupby, pairwise
 from operator import attrgetter
 from typing import Any
 
@@ -52,10 +51,8 @@ MET = {True: "met", False: "NOT met", None: MISSING}
 DAMPED = {Part.DISTANCE: "reached"}
 """Words for a bound that nobody requires; of others damped."""
 
-TRAIN, EVEN = 5, 0.05
-"""Pulses of one channel, at least, that are a train, and the share by which their distances may
-differ: the widths of their commands change as the nutation falls.
-"""
+SHORTLY = {"why-single-pulses": "single pulses"}
+"""Words for reasons that are too long for a table."""
 
 FIGURES = 8  # of a value beside its limit, at most
 
@@ -74,24 +71,10 @@ def spent(schedule: Schedule) -> str:
 
 
 def fired(schedule: Schedule) -> str:
-    """Number of pulses, of blocks and of trains; cost, and end of the last one."""
-    trains = []
-    single = 0
-    for channel, run in groupby(schedule, attrgetter("channel")):
-        del channel
-        times = [pulse.t for pulse in run]
-        gaps = [later - sooner for sooner, later in pairwise(times)]
-        if len(times) >= TRAIN and max(gaps) - min(gaps) <= EVEN * max(gaps):
-            trains.append(len(times))
-        else:
-            single += len(times)
-    if schedule.blocks or not trains:
-        count = f"pulses {len(schedule)}"
-    else:
-        counts = [f"train of {number}" for number in trains]
-        count = " and ".join([*counts, f"pulses {single}"] if single else counts)
+    """Number of blocks and pulses, cost, and end of the last one."""
     blocks = f"blocks {len(schedule.blocks)}, " if schedule.blocks else ""
-    return f"{blocks}{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
+    count = f"{blocks}pulses {len(schedule)}"
+    return f"{count}, {spent(schedule)}, ends at {duration(schedule.end)}"
 
 
 def headline(verdict: Verdict, compared: Comparison | None = None) -> tuple[str, str]:
@@ -206,7 +189,7 @@ def percent(share: float, *others: float) -> str:
     """
     distinct = [other for other in (*others, 0.0, 1.0) if other != share]
     for digits in range(1, 12):
-        shown = f"{100.0 * share:.{digits}f}"
+        shown = f"{100.0 * share:.{digits}f}" if share else "0"
         if all(float(shown) != float(f"{100.0 * other:.10g}") for other in distinct):
             return f"{shown} %"
     return f"{100.0 * share:.12g} %"
@@ -281,11 +264,17 @@ def bound_table(verdict: Verdict) -> DataTable:
         columns += [
             Column("", level, "", lambda line: value(line.bound, line.dispersed), where=where),
             Column(
-                "", "keep it", "", attrgetter("share"), lambda alone: percent(alone, share), where
+                "",
+                "keep it",
+                "",
+                attrgetter("share"),
+                lambda alone: percent(alone, share),
+                where,
+                rank=1,
             ),
         ]
     columns += [
-        Column("", "margin", "", margin, where=where),
+        Column("", "margin", "", margin, where=where, rank=2),
         Column("", "", "", line_word, where=where, kind=TEXT, met=attrgetter("met")),
     ]
     return DataTable("Requirement", columns, verdict.lines)
@@ -303,7 +292,7 @@ def scheme_word(compared: Comparison, plan: Plan) -> str:
         return "not found" if plan._found_none else "infeasible"
     why = compared.shortcoming(plan)
     if why is not None:
-        return text(why)
+        return SHORTLY.get(why.code) or text(why)
     verdict = compared.verdicts[plan]
     if verdict.required:
         return MET[True]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +25,7 @@ from support.commands import (
     written,
 )
 from support.contract import BROKEN
+from support.golden import check_text
 from support.process import Run
 
 from nutdamp import __version__, errors
@@ -165,6 +167,52 @@ def test_every_help_page_fits_the_screen_of_a_terminal(run: Run, command: str) -
     assert lines[0].startswith("Usage: ")
     assert len(lines) <= 60
     assert max(map(len, lines)) <= 80
+
+
+def options_of(page: str) -> list[str]:
+    """Options of a help page, by their long names."""
+    return re.findall(r"^  (?:-\w, )?(--[\w-]+)", page, re.MULTILINE)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_first_help_page_has_few_options_and_help_all_every_one(run: Run, command: str) -> None:
+    first, whole = (
+        options_of(run(command, flag, status=0).stdout)
+        if flag == "--help" or "--help-all" in options_of(run(command, "--help").stdout)
+        else []
+        for flag in ("--help", "--help-all")
+    )
+    assert len(first) == len({*first}) <= 20
+    known = group.get_command(click.Context(group), command)
+    assert known is not None
+    every = {name for param in known.params for name in param.opts if name.startswith("--")}
+    assert {*(whole or first)} - {"--help", "--help-all"} == every - {"--debug"}
+    assert not whole or {*first} < {*whole}
+
+
+def offered(words: str) -> list[str]:
+    """What a shell is offered for the last of the ``words`` of a command line."""
+    shell = ShellComplete(group, {}, "nutdamp", "_NUTDAMP_COMPLETE")
+    *before, begun = words.split(" ")
+    return [item.value for item in shell.get_completions(before, begun)]
+
+
+def test_topics_keys_and_schemes_are_completed() -> None:
+    assert offered("explain momentum-sh") == ["momentum-shift", "momentum-shift-of-target"]
+    assert offered("plan --set limits.h") == ["limits.horizon="]
+    assert offered("plan --set thrusters.") == []  # each file names its own
+    assert offered("plan --scheme rh") == ["rhumb-line"]
+
+
+def test_a_channel_of_a_file_is_explained_as_plan_says(run: Run) -> None:
+    file = f"{places.CONFIGS}/cluster.yaml"
+    shown = run("plan", file, "--scheme", "two-pulse", columns=200, status=0).stdout
+    _, command, *_ = shown.splitlines()[-1].split(" · ")
+    first, *words = command.split()
+    assert (first, words[0], words[-1]) == ("nutdamp", "explain", file)
+    for name in ("+M2", "-M2"):
+        check_text(f"explain.{name}", run("explain", name, file, status=0).stdout)
+    run("explain", "+M9", file, status=2)
 
 
 def test_trade_shows_no_option_that_it_does_not_read(run: Run) -> None:
@@ -355,7 +403,7 @@ def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
 
 def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run) -> None:
     ended = run("simulate", status=0)
-    assert "using recommended plan: two-pulse\n" in ended.stderr
+    assert "SIMULATED two-pulse" in ended.stdout
     assert ended.stdout == run("simulate", "--scheme", "two-pulse").stdout
 
 

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from support.commands import WIDER
 from support.dispersed import normal
 from support.flights import flown_outputs
 from support.golden import refused
-from support.places import case
+from support.places import CONFIGS, case
 
 import nutdamp
 from nutdamp.common import work
@@ -462,6 +463,25 @@ def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(
         robust.compare(sure)
     monkeypatch.setattr(four_pulse, "schedule", raising)  # a scheme with a bug is left out
     assert robust.variations_of(compare(dispersed(), ("four-pulse",))) == ([], [], [])
+
+
+@pytest.mark.deep
+def test_progress_of_a_robust_search_has_no_long_stall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In shares of its work: it stood at 13 % for all of it."""
+    compared = compare(nutdamp.load(CONFIGS / "single-thruster.yaml"))
+    shares: list[float] = []
+    spend = work.spend
+    with work.watched() as watch:
+
+        def spent(units: float) -> None:
+            shares.append(0.0 if watch.task is None else watch.task.share)
+            spend(units)
+
+        monkeypatch.setattr(work, "spend", spent)
+        robust.compare(compared, allocate=False)
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.6
+    assert max(late - early for early, late in pairwise([0.0, *shares])) < 0.35
 
 
 def test_tolerances_needed_only_of_a_plan_that_meets_and_within_their_budget(

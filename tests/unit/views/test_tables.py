@@ -8,6 +8,7 @@ import math
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from operator import itemgetter
 from types import SimpleNamespace as Row
 
 import numpy as np
@@ -22,8 +23,8 @@ import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.units import US, screen_units
-from nutdamp.views.glance import glance
-from nutdamp.views.parts import FEWEST, LINES, SIZES, WIDE, block_table, pulse_table
+from nutdamp.views.glance import LINES, glance
+from nutdamp.views.parts import NOTES, SIZES, block_table, pulse_table
 from nutdamp.views.tables import REAL, TEXT, WHOLE, WIDTH, YES_NO, Column, DataTable, angle_of
 from nutdamp.views.text import short_angle, vector
 from nutdamp.views.verdict import HEADLINES
@@ -123,8 +124,8 @@ def test_an_array_has_the_fields_of_the_file() -> None:
 
 
 def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
-    heads, units, *rows = screen(TABLE)
-    assert [heads, units] == [["size"], ["name", "count", "mm", "verdict"]]
+    heads, *rows = screen(TABLE)
+    assert heads == ["name", "count", "size", "mm", "verdict"]
     assert rows == [
         ["one", "1", "500.0", "met"],
         ["two", "2", "–", "–"],
@@ -132,17 +133,45 @@ def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
     ]
 
 
-def test_below_60_columns_each_row_is_a_block_of_what_is_known() -> None:
-    name = TABLE.screen("screen").columns[0].header
-    values = ["count", "size,", "verdict"]
-    assert [line[0] for line in screen(TABLE, width=59)] == [
-        name,
-        *values,
-        name,
-        "count",
-        name,
-        *values,
-    ]
+RANKED = DataTable(
+    "",
+    [
+        Column("", name, "", itemgetter(at), kind=TEXT, where="screen", rank=rank)
+        for at, (name, rank) in enumerate(
+            [("scheme", 0), ("pulses", 3), ("end s", 1), ("nutation left", 0), ("shift", 2)]
+        )
+    ],
+    [("one-pulse", "2", "33.89", "0.00313", "0.269"), ("two-pulse", "2", "820.7", "0.00519", "0")],
+)
+
+
+@pytest.mark.parametrize(
+    ("width", "heads"),
+    [
+        (60, [["scheme", "pulses", "end", "s", "nutation", "left", "shift"]]),
+        (42, [["scheme", "pulses", "end", "s", "nutation", "left", "shift"]]),
+        (40, [["nutation"], ["scheme", "pulses", "end", "s", "left", "shift"]]),
+        (33, [["nutation"], ["scheme", "end", "s", "left", "shift"]]),
+        (26, [["nutation"], ["scheme", "end", "s", "left"]]),
+        (18, [["nutation"], ["scheme", "left"]]),
+    ],
+)
+def test_columns_of_a_default_screen_go_by_their_rank(width: int, heads: list[list[str]]) -> None:
+    """The gap narrows, then headings take two lines, then the largest rank goes; never a row."""
+    table = RANKED.screen("screen")
+    table.shortened = True
+    lines = [line.split() for line in printed(table, width)]
+    assert lines[:-2] == heads
+    assert [line[0] for line in lines[-2:]] == ["one-pulse", "two-pulse"]
+
+
+def test_without_a_rank_columns_go_on_below_and_nothing_is_lost() -> None:
+    for width in (18, 24, 30):
+        lines = printed(RANKED.screen("screen"), width)
+        assert max(map(len, lines)) <= width
+        assert sum(line.startswith("one-pulse") for line in lines) > 1
+        words = {word for line in lines for word in line.split()}
+        assert words >= {text for row in RANKED.rows for text in row}
 
 
 def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_room() -> None:
@@ -199,13 +228,15 @@ def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
     )
     files = table.csv(), table.json()
     assert screen(table) == [
-        ["mass", "torque"],
-        ["kg", "N", "m"],
+        ["mass", "kg", "torque", "N", "m"],
         ["0.4536", "(1.356,", "0,", "-2.712)"],
         ["–", "–"],
     ]
     with screen_units(US):
-        assert screen(table)[1:3] == [["lbm", "ft", "lbf"], ["1.0000", "(1,", "0,", "-2)"]]
+        assert screen(table)[:2] == [
+            ["mass", "lbm", "torque", "ft", "lbf"],
+            ["1.0000", "(1,", "0,", "-2)"],
+        ]
         assert [heading.unit for heading in table.headings("screen")] == ["lbm", "ft lbf"]
         assert (table.csv(), table.json()) == files
 
@@ -224,24 +255,28 @@ def compared(body: Spacecraft, *names: str) -> nutdamp.Comparison:
 @pytest.mark.usefixtures("plans_shared")
 @spread("name", NAMES, quick=2, deep=len(NAMES))
 def test_a_plan_is_seen_at_a_glance(name: str) -> None:
-    lines = glance_lines(compared(nutdamp.load(CONFIGS / f"{name}.yaml")))
-    assert len(lines) <= LINES
-    assert max(map(len, lines)) <= WIDTH
-    assert [line for line in lines if line.startswith((*HEADLINES.values(),))] == [lines[1]]
-    assert lines[-1].startswith("-v ")
-    assert lines[-1].endswith("nutdamp report")
-    assert not any("…" in line and "more" not in line for line in lines)
+    screen = glance(compared(nutdamp.load(CONFIGS / f"{name}.yaml")))
+    for width, most in ((60, LINES[1]), (WIDTH, LINES[0]), (120, LINES[0])):
+        lines = printed(screen, width)
+        assert len(lines) <= most
+        assert max(map(len, lines)) <= width
+        assert [line for line in lines if line.startswith((*HEADLINES.values(),))] == [lines[1]]
+        assert lines[-1].startswith("-v ")
+        assert sum(line.startswith(("note[", "warning[")) for line in lines) <= NOTES
+        assert not any("…" in line and "more" not in line for line in lines)
+        (table,) = (part for part in "\n".join(lines).split("\n\n") if "\none-pulse" in part)
+        assert re.match(r"(?: .*\n)?scheme .*verdict(\n\S+ .*\S)+", table), "a row is broken"
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize("name", ["plan-25-lines", "plan-30-lines"])
 def test_a_plan_of_many_bounds_and_warnings_fits_a_terminal(name: str) -> None:
-    """Where no cell is broken; of 80 columns it takes more."""
+    """Lines between its tables go before a warning does."""
     with pytest.warns(UserWarning, match="is read as") if "25" in name else nullcontext():
         body = nutdamp.load(case(f"{name}.yaml"))
-    compared = nutdamp.compare(body)
-    assert len(printed(glance(compared), WIDE)) <= FEWEST
-    assert len(printed(glance(compared), WIDTH)) <= LINES
+    lines = printed(glance(nutdamp.compare(body)), 160)
+    assert len(lines) <= LINES[0]
+    assert any(line.startswith("warning[") for line in lines)
 
 
 @pytest.mark.usefixtures("plans_shared")
@@ -275,7 +310,7 @@ def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
     assert count > most + 1
     rows = glance_lines(plan)
     start = next(index for index, line in enumerate(rows) if line.startswith("pulse"))
-    first = [row.split()[0] for row in rows[start + 1 : start + most + 3]]
+    first = [row.split()[0] for row in rows[start + 1 : rows.index("", start)]]
     shown = first.index("…")
     assert first[: shown + 2] == [*map(str, range(1, shown + 1)), "…", str(count)]
     assert f"{count - shown - 1} more" in rows[start + shown + 1]
