@@ -358,7 +358,7 @@ def import_command(
 
     It reads CCSDS messages of version 2 in KVN (APM, AEM, ACM) and attitude files of STK (.a). With
     --into, attitude, epoch and rates replace those of a spacecraft file; all else stays. Of a
-    history one record is used, the one of --at. Without --into the message needs inertia and the
+    history the record of --at is used. Without --into the message needs inertia and the
     motion: angular velocity or spin. A message has no thrusters. If all its manoeuvres are
     transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be -
     for standard input.

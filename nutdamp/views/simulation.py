@@ -63,17 +63,21 @@ MODELS = {
 
 
 def _end_table(simulation: Simulation) -> DataTable:
-    """End of the track by both models."""
+    """End of the track by both models, of which one is that of the track."""
     spacecraft = simulation.flown.spacecraft
 
     def direction(name: str, angle: Column) -> Callable[[Flight], str]:
         return lambda flight: angle.worded(getattr(flight.final, name))
 
+    def model(flight: Flight) -> str:
+        name = MODELS[flight.model]
+        return f"{name}, track" if flight is simulation.shown else name
+
     residuals = ["nutation", "body_cone", "space_cone", "momentum_shift"]
     if spacecraft.goal.axis is not None:
         residuals.append("axis_error")
     columns = [
-        Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT),
+        Column("", "model", "", model, where="screen", kind=TEXT),
         *(
             Column(
                 "", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen"

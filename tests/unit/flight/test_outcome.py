@@ -183,7 +183,7 @@ def test_screen_json_and_last_row_of_the_track_are_one(
     assert data[final]["axis"]["tilt_deg"] == pytest.approx(tilt, abs=1e-9)
     assert len(data["pulses"]) >= int(last["pulse"])
     assert all(pulse["start_s"] < until for pulse in data["pulses"])
-    assert f"0 to {until:.3f} s" in " ".join(screen.split())
+    assert f"end of track, {until:.3f} s" in " ".join(screen.split())
     both = [data["residual"]["nutation_deg"], data["flown"]["nutation_deg"]]
     if min(both) > 1e-9:
         assert [float(cell) for cell in nutations(screen)] == pytest.approx(both, rel=1e-3)

@@ -309,7 +309,7 @@ def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
 def test_the_command_prints_both_tables(run: Run) -> None:
     verified = run("verify", "--scheme", "two-pulse", "-v")
     assert verified.returncode == 0
-    for text in ("DOP853", "agree", "Error budget", "pulse width", "all: as flown"):
+    for text in ("DOP853", "agree", "Error budget", "on-time", "all: as flown"):
         assert text in verified.stdout
     assert max(len(line.rstrip()) for line in verified.stdout.splitlines()) <= 80
 
