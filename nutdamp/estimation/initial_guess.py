@@ -63,6 +63,9 @@ def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
     """
     spin = _spin(model)
     record = model.record
+    if len(model.pulses):
+        # Pulses break the line of the nutation in a spectrum: the file may know its rate better.
+        yield {each.name: each.file for each in model.parameters}
     yield from _starts(model, share, spin)
     # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows
     # better.

@@ -24,7 +24,6 @@ from nutdamp.estimation.parameters import (
     KIND,
     RATIO,
     SUN_ASPECT,
-    UNSAID,
     Parameter,
     Record,
     Sighting,
@@ -50,6 +49,7 @@ from nutdamp.spacecraft.model import (
 )
 from nutdamp.spacecraft.schedule import Schedule
 
+HELD = 1e-6  # part of C/A within which a steady spin leaves it
 PREDICTION = 0.1  # units of `work` of a prediction, besides steps
 SHOWN = 2e-4  # of each of its samples
 SAMPLE = 1e-3  # of each time of a motion that is new
@@ -113,9 +113,7 @@ class Model:
         )
         if steady:
             self.parameters = tuple(
-                each._replace(prior=min(each.prior, UNSAID * each.file))
-                if each.name == RATIO
-                else each
+                each._replace(prior=HELD * each.file) if each.name == RATIO else each
                 for each in self.parameters
             )
         self.prior = prior(spacecraft, self.parameters)

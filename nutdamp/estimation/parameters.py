@@ -37,6 +37,7 @@ QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 SEEN = ("crossing_1", "crossing_2", "crossing_3")
 DIRECTION = ("crossing_x", "crossing_y", "crossing_z")
 ACCELERATION, SUN_ASPECT, CROSSING = "acceleration", "sun_aspect", "crossing"
+TURN = "turn"
 SUN_PULSE = "sun_pulse"
 
 BODY, SPACE = (
@@ -327,7 +328,7 @@ KINDS = (
         spread=1e-3,
     ),
     SignalKind(
-        "turn",
+        TURN,
         QUATERNION,
         "rad",
         _turn_off,

@@ -526,14 +526,14 @@ def spin_off(fitted: Fit) -> tuple[float, float] | None:
 
 def refused(fitted: Fit) -> bool:
     """True where an estimate is not accepted: constants much too far from the file, H turned, wrong
-    columns, or a search that ended before residuals were noise.
+    columns, or a search that ended early with a value far from the file or coloured residuals.
     """
     # A bias belongs to the sensor, and what the file says of it is usual, not of this one.
     far = any(not row.key.startswith("bias") for row, _ in far_from_file(fitted, REFUSED))
+    unfinished = not fitted.finished and bool(_coloured(fitted) or far_from_file(fitted))
     model = fitted.model
     # Of a mirrored record the mirrored motion is as likely, with H the other way.
     turned = model.body(fitted.named).sense != model.spacecraft.sense
-    unfinished = not fitted.finished and bool(_coloured(fitted))
     return far or turned or unfinished or bool(fitted.causes)
 
 

@@ -134,15 +134,26 @@ def scales_of(model: Model) -> Vector:
     return np.array(scales)
 
 
+FEW_EARLY = 12  # samples before the last pulse below which the whole record counts
+
+
 def share_left(model: Model, values: Vector) -> float:
-    """Least share of a signal's own variation that the residuals still have."""
+    """Least share of a signal's own variation that the residuals still have.
+
+    Until the last pulse, where there are pulses: the motion that they have damped hardly varies.
+    """
     misfits = residuals(model, values)
+    until = model.start + model.pulses.end if len(model.pulses) else math.inf
     shares = []
-    for index, shown in enumerate(model.samples):
-        rows = model.signal == index
+    for index, samples in enumerate(model.samples):
+        rows = np.flatnonzero(model.signal == index)
+        early = model.times[rows] <= until
+        if np.count_nonzero(early) < FEW_EARLY:
+            early[:] = True
+        shown = samples[early[: len(samples)]]
         varied = float(np.median(np.linalg.norm(shown - np.median(shown, axis=0), axis=1)))
         if varied > 0.0:
-            shares.append(float(np.median(np.abs(misfits[rows]))) / varied)
+            shares.append(float(np.median(np.abs(misfits[rows[early]]))) / varied)
     return min(shares, default=0.0)
 
 

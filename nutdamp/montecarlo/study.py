@@ -262,7 +262,9 @@ class Study(DrawnCases):
                 np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count)
             )
         if spacecraft.goal.spin is not None:
-            rows.append(np.broadcast_to(abs(ends.spin - spacecraft.goal.spin), (1, count)))
+            spins = [ends.spin] if ends.disturbed is None else [ends.spin, ends.disturbed.spin]
+            off = np.max(np.abs(np.array(spins) - spacecraft.goal.spin), axis=0)
+            rows.append(np.broadcast_to(off, (1, count)))
         return np.concatenate(rows)
 
     def _judged(self, ends: Ends, count: int) -> Array:

@@ -317,6 +317,7 @@ def _third_axis(quaternion: Array) -> Array:
 
 HALF = 1.01 * math.pi  # rad: a Sun pulse farther off than half a turn is lost
 ITERATIONS = 40  # largest number of Newton steps to a Sun pulse; three or four are usual
+SLOW = 0.01  # rate of the Sun's azimuth over its mean rate below which Newton's steps take the mean
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 # largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
 AHEAD = 8
@@ -529,8 +530,12 @@ class SunPulseClock:
             begun[rows] |= later
             ended[rows] |= ~later
             # Where the Sun is near the axis its azimuth may not change for a moment: then by the
-            # mean rate. Where it turns back Newton's steps go to and fro for ever: bisection ends.
-            time = some.since + off / np.where(rate > 0.1 * pace[rows], rate, pace[rows])
+            # mean rate, and by no more than a quarter turn, for beyond half a turn it is another
+            # passage that is off by less. Where it turns back Newton's steps go to and fro for
+            # ever: bisection ends.
+            step = off / np.where(rate > SLOW * pace[rows], rate, pace[rows])
+            quarter = 0.5 * math.pi / pace[rows]
+            time = some.since + np.clip(step, -quarter, quarter)
             time = np.clip(time, low[rows], high[rows])
             stuck = np.where(
                 later, ended[rows] & (time == high[rows]), begun[rows] & (time == low[rows])

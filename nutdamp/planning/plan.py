@@ -194,7 +194,7 @@ class Plan(results.Data, results.Rows):
     @property
     def _left(self) -> Left | None:
         """Flown residual for `requirements`; of nutation and distance the larger one of that and of
-        `disturbed`.
+        `disturbed`, of spins the one farther from the goal.
         """
         if not self.feasible:
             return None
@@ -202,7 +202,9 @@ class Plan(results.Data, results.Rows):
         if after is None:
             return left
         nutation, aim = max(left.nutation, after.nutation), max(left.aim, after.aim)
-        return left._replace(nutation=nutation, aim=aim)
+        goal = left.spin if self.spacecraft.goal.spin is None else self.spacecraft.goal.spin
+        spin = max(left.spin, after.spin, key=lambda each: abs(each - goal))
+        return left._replace(nutation=nutation, aim=aim, spin=spin)
 
     @cached_property
     def _commandable(self) -> bool:
