@@ -179,7 +179,7 @@ def plan(
     Examples
     --------
     >>> nutdamp.plan(nutdamp.example(), "two-pulse")
-    <Plan two-pulse: 2 pulses until 7.434 s, nutation left < 1e-9 deg>
+    <Plan two-pulse: 2 pulses until 7.434 s, nutation left 0 deg>
     >>> nutdamp.plan(nutdamp.example(), "four-pulse", on_time=0.2).pulses[0].on_time
     0.2
     """

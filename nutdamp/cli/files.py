@@ -26,6 +26,7 @@ from nutdamp.cli.job import (
 )
 from nutdamp.cli.main import (
     BAD_INPUT,
+    SPACECRAFT,
     UNREADABLE,
     console,
     leave,
@@ -82,6 +83,8 @@ def check_command(
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
     for entry in inputs:
+        if entry.path is not None:
+            click.get_current_context().meta[SPACECRAFT] = shlex.quote(entry.path)
         doubts: list[Fault] = []
         try:
             result = checked(

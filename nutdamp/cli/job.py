@@ -6,6 +6,7 @@ No output file may take the place of an input, or of another output.
 from __future__ import annotations
 
 import os
+import shlex
 import stat
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
@@ -16,7 +17,17 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.main import QUIET, UNITS, in_context, look_of_screen, say, show, working, wrapped
+from nutdamp.cli.main import (
+    QUIET,
+    SPACECRAFT,
+    UNITS,
+    in_context,
+    look_of_screen,
+    say,
+    show,
+    working,
+    wrapped,
+)
 from nutdamp.cli.options import (
     END,
     FILE,
@@ -392,6 +403,8 @@ def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
     """
     types = {each.name: each.type for each in command.params if each.name in parameters}
     spacecraft = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
+    if spacecraft.path is not None:
+        click.get_current_context().meta[SPACECRAFT] = shlex.quote(spacecraft.path)
     written = {
         name: parameters.pop(name)
         for name, kind in types.items()

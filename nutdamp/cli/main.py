@@ -199,7 +199,7 @@ class _Visible:
 
 # keys of options in the context of a command line
 UNITS = "nutdamp.units"
-QUIET = "nutdamp.quiet"
+QUIET, SPACECRAFT = "nutdamp.quiet", "nutdamp.spacecraft"
 DEBUG = "nutdamp.debug"
 
 
@@ -215,12 +215,14 @@ def in_context(key: str) -> Callable[[click.Context, click.Parameter, Value], Va
 
 @contextmanager
 def look_of_screen() -> Iterator[None]:
-    """Context of texts for people: the units of ``--units``, no notes with ``--quiet``."""
-    from nutdamp.views.text import quietly
+    """Context of texts for people: the units of ``--units``, no notes with ``--quiet``,
+    and the spacecraft file in next steps."""
+    from nutdamp.views.text import screens_of
 
     context = click.get_current_context(silent=True)
     meta = {} if context is None else context.meta
-    with screen_units(meta.get(UNITS, SI)), quietly(meta.get(QUIET, False)):
+    screens = screens_of(meta.get(SPACECRAFT, ""), hidden=meta.get(QUIET, False))
+    with screen_units(meta.get(UNITS, SI)), screens:
         yield
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -158,8 +157,7 @@ def plan_command(
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
         job.note(comparison_warnings(compared))
-    file = "" if job.given.path is None else shlex.quote(job.given.path)
-    screen = partial(_screen, compared, dispersed, verbose, file)
+    screen = partial(_screen, compared, dispersed, verbose)
     job.deliver(None, screen, more=more, unsaved=unproved)
     leave(judged.status, failed=show_failures(compared))
 
@@ -205,16 +203,16 @@ def _certified(
 
 
 def _screen(
-    compared: Comparison, dispersed: RobustComparison | None, verbose: bool, file: str
+    compared: Comparison, dispersed: RobustComparison | None, verbose: bool
 ) -> RenderableType:
     from nutdamp.views.glance import glance
 
     if dispersed is None and not verbose:
-        return glance(compared, file=file)
+        return glance(compared)
     from nutdamp.views.robust import comparison_screen, robust_notes, robust_screen
 
     if dispersed is None:
         return comparison_screen(compared)
     if verbose:
         return robust_screen(dispersed)
-    return glance(dispersed.joined, robust_notes(dispersed), file=file)
+    return glance(dispersed.joined, robust_notes(dispersed))

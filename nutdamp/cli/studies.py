@@ -619,7 +619,9 @@ def disperse_command(
         return
     flown: LoopDispersion | Dispersion
     with stoppable() as stopped, job.working("flying"):
-        hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
+        # Rows are written as they are flown, of any number of cases, and not again as a result.
+        rows = job.written.pop("csv")
+        hooks: dict[str, Any] = {"seed": seed, "csv": rows, "stopped": stopped}
         if plan is None:
             flown = api.disperse_loop(spacecraft, samples, until=until, remark=job.remark, **hooks)
         else:

@@ -290,14 +290,11 @@ def _bound(bound: Bound, plan: Plan) -> str:
     return shown if line.met else f"{NOT} {shown}"
 
 
-def glance(
-    compared: Comparison, robust: Sequence[Note] | None = None, *, file: str = ""
-) -> RenderableType:
+def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> RenderableType:
     """The screen of a comparison and the plan to fly, one of those compared, or of the reason why
     there is none.
 
-    ``robust``: notes on the choice, where dispersed cases made it; ``file``: of the spacecraft, as
-    commands name it.
+    ``robust``: notes on the choice, where dispersed cases made it.
     """
     judged, plan = compared.verdict, compared.recommended
     head = [parts.title(compared.spacecraft), headline(compared)]
@@ -321,13 +318,13 @@ def glance(
         return Group(*rows, schemes)
 
     every = [*(robust or ()), *notes(compared, robust=robust is not None)]
-    return parts.summary(head, table, every, parts.STEP.join(steps(plan, file)), lines=LINES)
+    return parts.summary(head, table, every, parts.STEP.join(steps(plan)), lines=LINES)
 
 
 LINES = (24, 30)  # of the screen, and of one narrower than 80 characters
 
 
-def steps(plan: Plan | None, file: str) -> Iterator[str]:
+def steps(plan: Plan | None) -> Iterator[str]:
     """Next steps: commands and options that tell more of the plan to fly, or take it further."""
     blocks = plan is not None and bool(plan.pulses.blocks)
     channel = (
@@ -336,7 +333,7 @@ def steps(plan: Plan | None, file: str) -> Iterator[str]:
         else ""
     )
     if channel:
-        yield f"nutdamp explain {channel} {file}".rstrip()
+        yield f"nutdamp explain {channel}"
     yield "--blocks blocks.csv" if blocks else "--csv pulses.csv"
     yield "--plot plan.png"
     yield "nutdamp report"

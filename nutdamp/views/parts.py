@@ -54,6 +54,7 @@ from nutdamp.views.text import (
     short_angle,
     small_angle,
     steering,
+    with_file,
 )
 
 if TYPE_CHECKING:
@@ -378,7 +379,14 @@ def summary(
     """
     ranked = sorted(ordered(notes), key=rank)
     if not verbose:
-        return DefaultScreen(head, table, ranked, steps.split(STEP), lines, silent=quiet())
+        return DefaultScreen(
+            head,
+            table,
+            ranked,
+            [with_file(step) for step in steps.split(STEP)],
+            lines,
+            silent=quiet(),
+        )
     body = [*head]
     for part in (*([] if table is None else [table()]), *more):
         body += [Text(), part]

@@ -9,6 +9,7 @@ and in each ∫ω3 dt grows by 2π.
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from operator import attrgetter
@@ -114,10 +115,18 @@ def simulation_screen(
         head,
         lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
         [*_notes(simulation), *planned],
-        "--csv track.csv · --plot motion.png · nutdamp verify",
+        parts.STEP.join(["--csv track.csv", "--plot motion.png", _verified(simulation.plan)]),
         more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
     )
+
+
+def _verified(plan: Plan) -> str:
+    """The command that verifies the schedule of a file, or the recommended plan."""
+    if not plan._from_file:
+        return "nutdamp verify"
+    kind = "blocks" if plan.pulses.blocks else "schedule"
+    return f"nutdamp verify --{kind} {shlex.quote(plan.scheme)}"
 
 
 def _notes(simulation: Simulation) -> Iterator[Note]:

@@ -293,6 +293,7 @@ def screen_line(note: Note) -> Text:
 
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+_file: ContextVar[str] = ContextVar("file", default="")
 
 
 def quiet() -> bool:
@@ -300,14 +301,22 @@ def quiet() -> bool:
     return _quiet.get()
 
 
+def with_file(step: str) -> str:
+    """A next step, with the spacecraft file of the command line if it is a command."""
+    return f"{step} {_file.get()}".rstrip() if step.startswith("nutdamp ") else step
+
+
 @contextmanager
-def quietly(hidden: bool) -> Iterator[None]:
-    """Context in which screens are `quiet`, if notes are to be ``hidden``."""
-    token = _quiet.set(hidden)
+def screens_of(file: str, *, hidden: bool) -> Iterator[None]:
+    """Context in which screens are `quiet`, if notes are to be ``hidden``, and next steps have the
+    ``file`` of the spacecraft.
+    """
+    tokens = _quiet.set(hidden), _file.set(file)
     try:
         yield
     finally:
-        _quiet.reset(token)
+        _quiet.reset(tokens[0])
+        _file.reset(tokens[1])
 
 
 def ordered(notes: Iterable[Note]) -> list[Note]:

@@ -549,7 +549,8 @@ OWN_NAMES = {"Sounder-1", "Sounder-1 (built-in example)", "Good", "Sat", "Tilted
 WRITTEN = re.compile(r"[-+|=/.\d_{}\\:@&*<>!→•–×≤≥±%✗~^§]|^nutdamp$|^[a-z]?$")  # no words
 
 
-PLAIN = {"using", "whatever", "shorten", "oppose", "please", "reduce", "removing", "Invalid"}
+PLAIN = {"using", "whatever", "shorten", "oppose", "please", "reduce", "removing", "Invalid",
+         "meant", "wherever", "Inspect"}  # fmt: skip
 
 
 @pytest.mark.deep

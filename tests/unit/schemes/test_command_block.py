@@ -714,6 +714,41 @@ def test_a_sun_whose_azimuth_turns_back_is_found_or_lost_within_few_turns(
     assert sum(turned) < 2.5 * float(pulse.since.max())
 
 
+@pytest.mark.parametrize("apart", [0.4, 1.0, 2.0, 4.0])
+def test_sun_pulses_near_the_axis_are_found(apart: float) -> None:
+    """The Sun ``apart`` deg outside of the cone of the axis about H comes each turn: at moments by
+    sampling the body's own motion.
+    """
+    count, nutation = 24, math.radians(58.0)
+    moments = np.array([70.0, 70.0, 90.0])
+    across = math.tan(nutation) * 90.0 / 70.0
+    phase = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+    rates = np.array([across * np.cos(phase), across * np.sin(phase), np.ones(count)])
+    bodies = Bodies(np.repeat(moments[:, None], count, axis=1), np.zeros(3))
+    quaternion = np.repeat(np.eye(4)[:, :1], count, axis=1)
+    start = MotionStretch(bodies, np.zeros(count), rates, quaternion)
+    momentum = (moments[:, None] * rates).T
+    axes = momentum / np.linalg.norm(momentum, axis=1)[:, None]
+    side = np.cross(axes, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    off = nutation + math.radians(apart)
+    sun = (math.cos(off) * axes + math.sin(off) * side).T
+    clock = SunPulseClock(start, sun, 1.0, 0.4)
+
+    def azimuths(here: MotionStretch) -> np.ndarray:
+        seen = attitude.rotate(attitude.conjugate(here.quaternion.T), sun.T)
+        return np.arctan2(seen[:, 1], seen[:, 0]) - 0.4
+
+    times = np.linspace(0.0, 40.0, 8001)
+    turned = np.unwrap([azimuths(start.moved(np.full(count, time))) for time in times], axis=0)
+    for number in (1, 2, 3):
+        pulse = clock.sun_pulse(number)
+        assert not clock.lost.any()
+        level = np.floor(turned[0] / (2.0 * math.pi)) - number + 1
+        passed = np.argmax(turned <= 2.0 * math.pi * level, axis=0)
+        assert pulse.since == pytest.approx(times[passed], abs=times[1])
+
+
 @pytest.mark.parametrize("heading", [0.4, math.pi / 2, math.pi / 2 + 1e-7, 3.0, -2.0, 0.0])
 def test_a_rhumb_line_is_the_solution_of_its_equations(heading: float) -> None:
     """dγ/ds = cos χ, dλ/ds = sin χ/sin γ, and its meridian turns by cos γ dλ; past the Sun it ends
