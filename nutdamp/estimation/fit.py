@@ -60,6 +60,7 @@ from nutdamp.spacecraft.model import Spacecraft
 # budget of work over that of a coast: a flight of ten pulses takes as much more, and a search of
 # optimal's in noise of 2e-4 rad/s ended before its last fits
 PULSED = 3.0
+ROUNDED = 1e-6  # range of a direction that does not change, written to six digits at least
 QUIET = 2  # samples after the last pulse within which a damped motion falls still, at most
 FEWEST = 20  # number of samples that are alike in a row where a sensor is stuck, at least
 COARSE = 10  # a record that has so few different values is one of coarse steps
@@ -90,7 +91,8 @@ def expect_alive(model: Model) -> tuple[str, ...]:
     steady = {*GYROS} == constant == {*shown} and moves <= spins and bool(spins)
     # Nor does anything but its turn, of a body that has no nutation by its file.
     calm = model.spacecraft.transverse_rate == 0.0 and not moves & {*GYROS[:2]}
-    still = calm and {*shown} - constant <= {TURN}
+    moving = (np.ptp(shown[name][1], axis=0) > ROUNDED for name in {*shown} - constant - {TURN})
+    still = calm and not any(map(np.any, moving))
     last_pulse = max((pulse.over for pulse in model.record.schedule), default=-math.inf)
     faults = []
     for name, (times, values) in shown.items():
@@ -118,7 +120,7 @@ def expect_alive(model: Model) -> tuple[str, ...]:
             faults.append(
                 f"{name} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples)"
             )
-        elif at_an_end > SATURATED and name not in spins:
+        elif at_an_end > SATURATED and name not in spins and not damped:
             share = 100.0 * at_an_end
             faults.append(f"{name} is at its largest or smallest value in {share:.3g} % of samples")
     if faults:
