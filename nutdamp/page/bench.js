@@ -127,7 +127,7 @@ function workbench(view, data, show) {
     && pulses.every(({ start, on, plan }) => start === plan.start && on === plan.on);
   const valueText = (key, value) => {
     const shown = key === "spin" ? value : value / DEGREE;
-    const text = shown === 0 ? "0" : shown < 1e-9 ? "< 1e-9" : shown.toPrecision(4);
+    const text = shown < 1e-9 ? "0" : shown.toPrecision(4);
     return text + (key === "spin" ? " rad/s" : "°");
   };
   const put = (cell, key, value) => {
