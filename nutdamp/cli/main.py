@@ -215,8 +215,9 @@ def in_context(key: str) -> Callable[[click.Context, click.Parameter, Value], Va
 
 @contextmanager
 def look_of_screen() -> Iterator[None]:
-    """Context of texts for people: the units of ``--units``, no notes with ``--quiet``,
-    and the spacecraft file in next steps."""
+    """Context of texts for people: the units of ``--units``, no notes with ``--quiet``, and the
+    spacecraft file in next steps.
+    """
     from nutdamp.views.text import screens_of
 
     context = click.get_current_context(silent=True)

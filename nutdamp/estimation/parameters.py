@@ -374,7 +374,6 @@ TILT = math.radians(
 # noise
 THRUST = 0.5
 DELAY = 0.05  # standard deviation of what a channel's thrust is late, s
-UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the file gives none
 TINY = 1e-7  # step of derivatives, rad, or as a share of a value
 
 

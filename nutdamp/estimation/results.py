@@ -31,7 +31,6 @@ from nutdamp.estimation.parameters import (
     GYROS,
     RATIO,
     SEEN,
-    UNSAID,
     Matrix,
     Record,
     Values,
@@ -498,6 +497,7 @@ FAR, REFUSED = (
     3.0,
     5.0,
 )  # sigmas of the file by which a constant is off that is said, and that is not accepted
+UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the file gives none
 OTHER_SPIN = 0.01  # part by which a spin is off that is said
 
 

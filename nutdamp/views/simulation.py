@@ -72,7 +72,7 @@ def _end_table(simulation: Simulation) -> DataTable:
 
     def model(flight: Flight) -> str:
         name = MODELS[flight.model]
-        return f"{name}, track" if flight is simulation.shown else name
+        return f"{name}, track" if flight.model == simulation.shown.model else name
 
     residuals = ["nutation", "body_cone", "space_cone", "momentum_shift"]
     if spacecraft.goal.axis is not None:

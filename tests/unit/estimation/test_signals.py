@@ -4,6 +4,7 @@ what is refused.
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,14 @@ from nutdamp.estimation.fit import fit
 from nutdamp.estimation.initial_guess import spin_of
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record, quantisation
-from nutdamp.estimation.results import Estimate, carried, doubts, estimates
+from nutdamp.estimation.results import (
+    Estimate,
+    carried,
+    doubts,
+    estimates,
+    far_from_file,
+    refused,
+)
 from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.flight import propagation
@@ -349,6 +357,33 @@ def test_noise_for_rates_ends_and_is_no_nutation() -> None:
     assert "nutation-not-seen" in {each.code for each in doubts(fitted)}
     spin = estimate(fitted, "spin")
     assert spin.value == pytest.approx(3.0, abs=4.0 * spin.sigma)
+
+
+def test_dead_gyros_of_a_steady_body_beside_a_nutation_are_named() -> None:
+    """The file has no nutation, the gyros show none, and the axis goes round by 0.1 deg."""
+    still = EXAMPLE.with_(state={"spin": "30 rpm", "nutation": "0 deg"})
+    times = np.linspace(0.0, 60.0, 301)
+    tilt, turned = math.radians(0.1), 2.1 * times
+    axis = (
+        np.sin(tilt) * np.cos(turned),
+        np.sin(tilt) * np.sin(turned),
+        0.0 * times + np.cos(tilt),
+    )
+    zeros = np.zeros_like(times)
+    gyros = dict(zip(GYROS, (zeros, zeros, zeros + still.spin), strict=True))
+    record = Record(times, gyros | dict(zip(AXIS, axis, strict=True)))
+    assert "omega_1 does not change" in refusal(Infeasible, fit, still, record)
+
+
+def test_a_search_cut_short_with_a_value_far_off_is_not_accepted() -> None:
+    """A bias of 0.3 deg/s is far from the usual 0.02 deg/s, and accepted of a whole search only."""
+    times = np.linspace(0.0, 60.0, 121)
+    rates = motion((120.0, 120.0, 80.0), np.array([0.14, 0.12, SPIN]), times)
+    fitted = fit(EXAMPLE, noisy(times, rates + np.radians([0.3, 0.0, 0.0])))
+    assert [row.key for row, _ in far_from_file(fitted)] == ["bias_omega_1"]
+    assert fitted.finished
+    assert not refused(fitted)
+    assert refused(replace(fitted, finished=False))
 
 
 def test_a_spin_against_the_file_is_doubted_and_nutation_counts_from_its_own_sense() -> None:

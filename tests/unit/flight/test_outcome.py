@@ -30,7 +30,7 @@ from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
-from nutdamp.planning.notes import plan_notes, reasons
+from nutdamp.planning.notes import plan_notes, reasons, verdict_notes
 from nutdamp.planning.verdict import Status
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import (
@@ -184,6 +184,8 @@ def test_screen_json_and_last_row_of_the_track_are_one(
     assert len(data["pulses"]) >= int(last["pulse"])
     assert all(pulse["start_s"] < until for pulse in data["pulses"])
     assert f"end of track, {until:.3f} s" in " ".join(screen.split())
+    model = "full simulation" if options else "impulse approximation (17)"
+    assert f"{model}, track" in screen
     both = [data["residual"]["nutation_deg"], data["flown"]["nutation_deg"]]
     if min(both) > 1e-9:
         assert [float(cell) for cell in nutations(screen)] == pytest.approx(both, rel=1e-3)
@@ -578,6 +580,22 @@ def test_the_spin_required_must_be_kept_after_the_last_disturbance_too() -> None
     assert spin.left == pytest.approx(change, rel=1e-9)
     assert plan.meets_requirement is False
     assert nutdamp.disperse(plan, 100).verdict.status is Status.NOT_ENOUGH
+
+
+@pytest.mark.parametrize(("spin", "doubted"), [("20 rpm", True), ("29.99 rpm", False)])
+def test_a_torque_fixed_in_space_is_doubted_where_the_spin_changes(
+    spin: str, doubted: bool
+) -> None:
+    body = nutdamp.example().with_(
+        steerable={"torque": "10 N m"},
+        thrusters=[{"name": "S", "torque": [0, 0, -5]}],
+        state={"spin": "30 rpm", "nutation": 0},
+        goal={"spin": spin},
+        requirement={"nutation": "2 deg"},
+        disturbances=[{"torque": [0.01, 0, 0], "fixed_in": "inertial", "until": "60 s"}],
+    )
+    plan = nutdamp.plan(body, scheme="optimal")
+    assert ("inertial-torque-drifts" in codes(verdict_notes(plan.verdict, plan))) is doubted
 
 
 def test_the_largest_nutation_under_a_torque_that_lasts_is_that_of_its_beat() -> None:
