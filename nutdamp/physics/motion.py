@@ -1,9 +1,9 @@
 """Motion of rigid bodies, one or many at once: coasts and powered stretches.
 
 Arrays carry the body last; those of one body have no such axis. Coasts of symmetric bodies without
-external torque are arcs in closed form, with energy dissipation too (`arc`); `triaxial` has the
-free motion of a body with three different moments. All else are the Taylor series of `series`, in
-steps of up to `STRIDE` rad.
+external torque are arcs in closed form, with energy dissipation too (`arc`); free bodies with three
+different moments move in Jacobi's functions (`triaxial.coasts`). All else are the Taylor series of
+`series`, in steps of up to `STRIDE` rad.
 """
 
 from __future__ import annotations
@@ -197,12 +197,26 @@ def advance(here: MotionStretch, duration: Any) -> None:
         rates[:], quaternion[:] = arc(A, C, bodies.forcing, *start, duration)
         quaternion /= np.sqrt(np.sum(quaternion * quaternion, axis=0))
         return
+    # A single step of the series costs as much as the closed form.
+    far = quaternion.ndim == 2 and np.max(_size(rates) * np.abs(duration)) > STRIDE
+    if far and _left_alone(here):
+        from nutdamp.physics import triaxial  # three different moments
+
+        rates[:], quaternion[:] = triaxial.coasts(bodies.moments, rates, quaternion, duration)
+        return
     if quaternion.ndim == 2 and len(here.since) <= FEW and _steady(here):
         _advance_symmetric(here, duration)
         return
     for piece in polynomials(here, duration):
         last = piece
     rates[:], quaternion[:] = last.end()
+
+
+def _left_alone(here: MotionStretch) -> bool:
+    """True for bodies without wheel, torque or dissipation."""
+    (turning, growth, wheel, _, timed), constant = here.bodies.forcing, here.bodies.constant
+    driven = turning or timed or growth != 0.0 or np.any(wheel) or constant.any()
+    return not driven and here.torque is None and here.falling is None
 
 
 def _steady(here: MotionStretch) -> bool:

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nutdamp.common.numerics import TINY
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 
@@ -35,6 +36,8 @@ NEGLIGIBLE = 1e-140
 underflow.
 """
 
+# share of two terms of a difference below which it is taken in fractions, to keep all digits
+CANCELS = 0.1
 # largest number of steps to an arithmetic-geometric mean; from the smallest number it takes twelve
 MEANS = 40
 MODES_REACH = (
@@ -51,14 +54,29 @@ def free_rates(moments: ArrayLike, rates0: ArrayLike, times: ArrayLike) -> Array
     their uncertainty moves the phase by about 1/(1 - m) times as much each period, as it does for
     the spacecraft itself.
     """
-    polhode = _polhode(moments, rates0)
-    return polhode.rate_unit * _rates(polhode, polhode.rate_unit * np.asarray(times, dtype=float))
+    polhodes = _polhodes(_column(moments), _column(rates0))
+    return polhodes.body_rates(np.asarray(times, dtype=float)).T
 
 
 def free_attitude(
     moments: ArrayLike, rates0: ArrayLike, quaternion0: ArrayLike, times: ArrayLike
 ) -> Array:
-    """Attitude (n, 4), body -> inertial, of torque-free motion from ``quaternion0`` (4,) at t = 0.
+    """Attitude (n, 4), body -> inertial, of torque-free motion from ``quaternion0`` (4,) at t = 0:
+    see `coasts`.
+    """
+    start = _column(moments), _column(rates0), _column(quaternion0)
+    return coasts(*start, np.asarray(times, dtype=float))[1].T
+
+
+def _column(values: ArrayLike) -> Array:
+    """One body as an array of bodies."""
+    return np.asarray(values, dtype=float)[:, None]
+
+
+def coasts(moments: Array, rates0: Array, quaternion0: Array, times: Array) -> tuple[Array, Array]:
+    """Rates (3, n) rad/s and unit quaternions (4, n) of bodies of ``moments`` (3, n) kg m² after
+    ``times`` (n,) s, from ``rates0`` (3, n) and ``quaternion0`` (4, n); one body, (3, 1), at n
+    times, too.
 
     With e the unit vector of axis c on the side of H, and S the shortest turn of H's direction in
     the body to e, R(t) = R(0) S(0)⁻¹ Rot_e(χ) S(t), because H is fixed in space. What is left is
@@ -66,29 +84,31 @@ def free_attitude(
     >= 0. Its integral is summed as a Fourier series over a period of ω_e. Errors: a few roundings
     of the angle turned, below 1e-11 rad over 100 periods.
     """
-    polhode = _polhode(moments, rates0)
-    start = np.asarray(quaternion0, dtype=float)
-    scaled = polhode.rate_unit * np.asarray(times, dtype=float)
-    if polhode.pace == 0.0:
-        return attitude.multiply(start, _turn(polhode.rates, scaled))
-    c = polhode.axes[2]
-    e = np.zeros(3)
-    e[c] = math.copysign(1.0, polhode.rates[c])
-    momentum = polhode.moments * polhode.rates
-    size = float(np.linalg.norm(momentum))
-    twice_energy = float(momentum @ polhode.rates)
+    polhodes = _polhodes(moments, rates0)
+    scaled = polhodes.rate_unit * times
+    start = polhodes.moments * polhodes.rates
+    size = np.sqrt(np.sum(start * start, axis=0)) + TINY
+    e = np.zeros_like(start)
+    e[2] = np.copysign(1.0, polhodes.rates[2])
+    twice_energy = np.sum(start * polhodes.rates, axis=0)
     # Of χ the part that swings about 2T t/|H| is split off: its factor H² - 2T I_c vanishes with
     # the nutation.
-    swing = math.copysign(
-        polhode.about_c / size, polhode.moments[polhode.axes[0]] - polhode.moments[c]
-    )
-    chi = twice_energy / size * scaled + swing * _swing(polhode, size, scaled)
-    back = attitude.conjugate(_shortest(momentum, e))
-    there = _shortest(polhode.moments * _rates(polhode, scaled), e)
-    result = attitude.multiply(
-        attitude.multiply(attitude.multiply(start, back), _turn(e, chi)), there
-    )
-    return np.asarray(result / np.linalg.norm(result, axis=-1, keepdims=True), dtype=np.float64)
+    swing = np.copysign(polhodes.about_c / size, polhodes.moments[0] - polhodes.moments[2])
+    chi = twice_energy / size * scaled + swing * _swing(polhodes, size, scaled)
+    end = polhodes.moments * _rates(polhodes, scaled)
+    toward = polhodes.in_body(e)
+    cosine, sine = np.cos(0.5 * chi), np.sin(0.5 * chi)
+    w, x, y, z = _shortest(polhodes.in_body(start), toward)
+    back = attitude.product((w, -x, -y, -z), (cosine, *(sine * toward)))
+    turns = np.array(attitude.product(back, _shortest(polhodes.in_body(end), toward)))
+    still = polhodes.pace == 0.0
+    if np.any(still):
+        speed = np.sqrt(np.sum(rates0 * rates0, axis=0)) + TINY
+        half = 0.5 * speed * times
+        constant = np.array([np.cos(half), *(np.sin(half) / speed * rates0)])
+        turns = np.where(still, constant, turns)
+    result: Array = np.array(attitude.product(quaternion0, turns))
+    return polhodes.body_rates(times), result / np.sqrt(np.sum(result * result, axis=0))
 
 
 def body_nutation_rate(moments: ArrayLike, spin: float, wheel: float = 0.0) -> float:
@@ -116,11 +136,11 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
 
     Infinite on the separatrix and where the rates are constant for want of a restoring couple.
     """
-    polhode = _polhode(moments, rates0)
-    if polhode.pace == 0.0 or polhode.complement == 0.0:
+    polhodes = _polhodes(_column(moments), _column(rates0))
+    if polhodes.pace[0] == 0.0 or polhodes.complement[0] == 0.0:
         return math.inf
-    quarter = 0.5 * math.pi / _means(polhode.complement)[1]
-    return 4.0 * quarter / (polhode.pace * polhode.rate_unit)
+    quarter = 0.5 * math.pi / _means(polhodes.complement)[1]
+    return float((4.0 * quarter / (polhodes.pace * polhodes.rate_unit))[0])
 
 
 def widest_cones(
@@ -171,174 +191,196 @@ def _first_zero(value: Array, slope: Array, bend: Array) -> Array:
     )  # at rest there, even if not for long
 
 
-class _ScaledPolhode(NamedTuple):
-    """Path of ω in the body; moments and rates scaled by powers of two
+class _ScaledPolhodes(NamedTuple):
+    """Paths of ω in n bodies, in their axes a, b and c; moments and rates scaled by powers of two
     against under- and overflow.
     """
 
-    axes: tuple[int, int, int]  # a, b, c
-    moments: Array
-    rates: Array
-    rate_unit: float
-    largest: float  # D
-    pace: float  # p; zero where the rates are constant
-    complement: float  # 1 - m
-    about_c: float  # P
+    axes: NDArray[np.intp]  # (3, n)
+    moments: Array  # (3, n)
+    rates: Array  # (3, n)
+    slopes: Array  # (3, n), dω/dt
+    rate_unit: Array  # (n,), as all below
+    largest: Array  # D
+    pace: Array  # p; zero where the rates are constant
+    complement: Array  # 1 - m
+    about_c: Array  # P
+
+    def in_body(self, vectors: Array) -> Array:
+        """Vectors (3, n) with their components in the order of the body's axes 1, 2, 3."""
+        return np.take_along_axis(vectors, np.argsort(self.axes, axis=0), axis=0)
+
+    def body_rates(self, times: Array) -> Array:
+        """Rates (3, n) in rad/s after ``times`` (n,) s."""
+        return self.rate_unit * self.in_body(_rates(self, self.rate_unit * times))
 
 
-def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
-    inertia, rates = np.array(moments, dtype=float), np.array(rates0, dtype=float)
-    inertia /= _unit(inertia)
-    rate_unit = _unit(rates)
-    rates /= rate_unit
-    rates[np.abs(rates) < NEGLIGIBLE] = 0.0
-    least, b, most = (int(axis) for axis in np.argsort(inertia, kind="stable"))
-    # H² - 2T I_b, positive about the axis of the largest moment, zero on the separatrix: rational,
-    # to keep all digits.
-    i_least, i_middle, i_most = (Fraction(float(inertia[axis])) for axis in (least, b, most))
-    w_least, w_most = Fraction(float(rates[least])), Fraction(float(rates[most]))
-    balance = float(
-        i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2
+def _polhodes(moments: Array, rates0: Array) -> _ScaledPolhodes:
+    """Paths of bodies of ``moments`` (3, n) through ``rates0`` (3, n)."""
+    inertia = moments / _unit(moments)
+    rate_unit = _unit(rates0)
+    rates = rates0 / rate_unit
+    rates = np.where(np.abs(rates) < NEGLIGIBLE, 0.0, rates)
+    order = np.argsort(inertia, axis=0, kind="stable")
+    inertia, sorted_rates = (np.take_along_axis(each, order, axis=0) for each in (inertia, rates))
+    # H² - 2T I_b, positive about the axis of the largest moment, zero on the separatrix
+    least, middle, largest = inertia
+    ups = largest * (largest - middle) * sorted_rates[2] ** 2
+    downs = least * (middle - least) * sorted_rates[0] ** 2
+    balance = ups - downs
+    for case in np.flatnonzero(np.abs(balance) < CANCELS * (ups + downs)):
+        i_least, i_middle, i_most, w_least, _, w_most = (
+            Fraction(float(value)) for value in (*inertia[:, case], *sorted_rates[:, case])
+        )
+        balance[case] = float(
+            i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2
+        )
+    reverse = balance < 0.0
+    axes, inertia, rates = (
+        np.where(reverse, each[::-1], each) for each in (order, inertia, sorted_rates)
     )
-    a, c = (least, most) if balance >= 0.0 else (most, least)
-    d_ca, d_cb, d_ba = (abs(float(inertia[x] - inertia[y])) for x, y in ((c, a), (c, b), (b, a)))
-    about_c = float(inertia[a] * d_ca * rates[a] ** 2 + inertia[b] * d_cb * rates[b] ** 2)
-    largest, pace, complement = 0.0, 0.0, 1.0
+    # a, b, c follow one another round, or b, a, c do
+    round_about = np.where((axes[1] - axes[0]) % 3 == 1, 1.0, -1.0)
+    after, last = [1, 2, 0], [2, 0, 1]
+    slopes = round_about * (inertia[after] - inertia[last]) / inertia * rates[after] * rates[last]
+    a, b, c = inertia
+    d_ca, d_cb, d_ba = np.abs(c - a), np.abs(c - b), np.abs(b - a)
+    about_c = a * d_ca * rates[0] ** 2 + b * d_cb * rates[1] ** 2
     # Otherwise every product ω_x ω_y (I_x - I_y) is zero.
-    if d_cb > 0.0 and rates[c] != 0.0:
-        largest = math.sqrt(rates[c] ** 2 + inertia[b] * d_ba / (inertia[c] * d_ca) * rates[b] ** 2)
-        pace = largest * math.sqrt(d_ca / inertia[a] * (d_cb / inertia[b]))
-        complement = min(abs(balance) / (inertia[c] * d_cb * largest**2), 1.0)
-    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c)
+    moves = (d_cb > 0.0) & (rates[2] != 0.0)
+    apart = np.where(moves, d_ca, 1.0)
+    top = np.sqrt(rates[2] ** 2 + b * d_ba / (c * apart) * rates[1] ** 2)
+    pace = np.where(moves, top * np.sqrt(d_ca / a * (d_cb / b)), 0.0)
+    whole = np.where(moves, c * d_cb * top**2, 1.0)
+    complement = np.where(moves, np.minimum(np.abs(balance) / whole, 1.0), 1.0)
+    return _ScaledPolhodes(axes, inertia, rates, slopes, rate_unit, top, pace, complement, about_c)
 
 
-def _unit(values: Array) -> float:
-    """Power of two near the largest value: dividing by it rounds nothing."""
-    largest = float(np.max(np.abs(values)))
-    return math.ldexp(1.0, math.frexp(largest)[1] - 1) if largest > 0.0 else 1.0
+def _unit(values: Array) -> Array:
+    """Power of two (n,) near the largest value of each (3, n): dividing by it rounds nothing."""
+    exponents: NDArray[np.intc] = np.frexp(np.max(np.abs(values), axis=0))[1] - 1
+    return np.asarray(np.ldexp(1.0, exponents))
 
 
-def _rates(polhode: _ScaledPolhode, times: Array) -> Array:
-    """Scaled rates at scaled times: addition theorems, with the amplitudes written as dω/dt at t =
-    0.
+def _rates(polhodes: _ScaledPolhodes, times: Array) -> Array:
+    """Scaled rates (3, ...) about a, b, c at scaled times: addition theorems, with the amplitudes
+    written as dω/dt at t = 0.
 
     ω_a(t) = (ω_a cn + ω_a' sn dn/p)/N, ω_b(t) = (ω_b cn dn + ω_b' sn/p)/N, ω_c(t) = (ω_c dn + ω_c'
     sn cn/p)/N with N = cn² + sn² (ω_c/D)², all of them of p t.
     """
-    rates, inertia, (a, b, c) = polhode.rates, polhode.moments, polhode.axes
-    if polhode.pace == 0.0:
-        return np.broadcast_to(rates, (*times.shape, 3)).copy()
-    slope = (
-        (np.roll(inertia, -1) - np.roll(inertia, -2))
-        / inertia
-        * np.roll(rates, -1)
-        * np.roll(rates, -2)
+    moves = polhodes.pace > 0.0
+    pace = np.where(moves, polhodes.pace, 1.0)
+    largest = np.where(moves, polhodes.largest, 1.0)
+    sn, cn, dn = _jacobi(pace * times, polhodes.complement)
+    passed = sn / pace
+    norm = np.square(cn) + np.square(sn * (polhodes.rates[2] / largest))
+    norm = np.where(moves, norm, 1.0)
+    (a, b, c), (a_slope, b_slope, c_slope) = polhodes.rates, polhodes.slopes
+    result = np.array(
+        [
+            (a * cn + a_slope * passed * dn) / norm,
+            (b * cn * dn + b_slope * passed) / norm,
+            (c * dn + c_slope * passed * cn) / norm,
+        ]
     )
-    sn, cn, dn = _jacobi(polhode.pace * times, polhode.complement)
-    gone = sn / polhode.pace
-    norm = np.square(cn) + np.square(sn * (rates[c] / polhode.largest))
-    result = np.empty((*times.shape, 3))
-    result[..., a] = (rates[a] * cn + slope[a] * gone * dn) / norm
-    result[..., b] = (rates[b] * cn * dn + slope[b] * gone) / norm
-    result[..., c] = (rates[c] * dn + slope[c] * gone * cn) / norm
-    return result
+    if np.all(moves):
+        return result
+    shape = (3, *[1] * (result.ndim - polhodes.rates.ndim), polhodes.rates.shape[1])
+    return np.where(moves, result, polhodes.rates.reshape(shape))
 
 
-def _swing(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
+def _swing(polhodes: _ScaledPolhodes, size: Array, times: Array) -> Array:
     """∫ |ω_c|/(|H| + I_c |ω_c|) dt from 0 to scaled ``times``."""
-    if polhode.complement == 0.0:
-        return _swing_on_separatrix(polhode, size, times)
-    c = polhode.axes[2]
-    mean = _means(polhode.complement)[1]
-    period = 2.0 * (0.5 * math.pi / mean) / polhode.pace
+    split = polhodes.complement == 0.0
+    if np.all(split):
+        return _swing_on_separatrix(polhodes, size, times)
+    complement = np.where(split, 1.0, polhodes.complement)
+    mean = _means(complement)[1]
+    period = math.pi / mean / np.where(polhodes.pace > 0.0, polhodes.pace, 1.0)
     # The integrand is regular within K' of the real axis, so that its coefficients fall like exp(-π
     # k K'/K).
-    parameter_agm = _means(1.0 - polhode.complement)[1] if polhode.complement < 1.0 else 0.0
-    modes = 2 + math.ceil(MODES_REACH / math.pi * parameter_agm / mean)
+    swings = complement < 1.0
+    parameter_agm = _means(np.where(swings, 1.0 - complement, 1.0))[1]
+    widest = float(np.max(np.where(swings, parameter_agm / mean, 0.0)))
+    modes = 2 + math.ceil(MODES_REACH / math.pi * widest)
     count = 2 * modes + 1
-    rate = np.abs(_rates(polhode, np.linspace(0.0, period, count, endpoint=False))[:, c])
-    coefficients = np.fft.rfft(rate / (size + polhode.moments[c] * rate)) / count
+    shares = np.arange(count)[:, None] / count
+    periodic = polhodes._replace(complement=complement)
+    rate = np.abs(_rates(periodic, shares * period)[2])
+    coefficients = np.fft.rfft(rate / (size + polhodes.moments[2] * rate), axis=0) / count
     total = coefficients[0].real * times
+    # twice sin(x/2) times the real part of the coefficient turned by x/2, x = 2π k t/period
+    phase = np.exp(1j * math.pi / period * times)
+    turned = np.ones_like(phase)
     for k, coefficient in enumerate(coefficients[1:], 1):
-        half = math.pi * k / period * times
-        total += (
-            2.0 * period / (math.pi * k) * np.sin(half) * (coefficient * np.exp(1j * half)).real
-        )
+        turned = turned * phase
+        size_of_mode = 2.0 * period / (math.pi * k)
+        total += size_of_mode * turned.imag * (coefficient * turned).real
+    if np.any(split):
+        total = np.where(split, _swing_on_separatrix(polhodes, size, times), total)
     return np.asarray(total)
 
 
-def _swing_on_separatrix(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
+def _swing_on_separatrix(polhodes: _ScaledPolhodes, size: Array, times: Array) -> Array:
     """`_swing` without a period: ω_c = D sech u, so that the integrand is D/(|H|(cosh u + ε)), ε =
     I_c D/|H|.
 
-    sqrt(1 - ε²) is I_a |ω_a|/|H| at ω_b = 0, free of cancellation.
+    sqrt(1 - ε²) is I_a |ω_a|/|H| at ω_b = 0, free of cancellation. Only where 1 - m is zero.
     """
-    a, b, c = polhode.axes
-    inertia, rates = polhode.moments, polhode.rates
-    d_ca, d_ba = abs(inertia[c] - inertia[a]), abs(inertia[b] - inertia[a])
-    epsilon = inertia[c] * polhode.largest / size
-    root = math.sqrt(inertia[a] * polhode.about_c / d_ca) / size
+    on_it = polhodes.complement == 0.0
+    (a, b, c), rates = polhodes.moments, polhodes.rates
+    d_ca, d_ba = (np.where(on_it, np.abs(each - a), 1.0) for each in (c, b))
+    third, pace = (np.where(on_it, each, 1.0) for each in (rates[2], polhodes.pace))
+    epsilon = c * polhodes.largest / size
+    root = np.where(on_it, np.sqrt(a * polhodes.about_c / d_ca) / size, 1.0)
     # At the start |sinh u| is |ω_b/ω_c| times the ratio of their largest values; u > 0 where |ω_c|
     # falls.
-    following, last = (c + 1) % 3, (c + 2) % 3
-    rising = (inertia[following] - inertia[last]) * rates[following] * rates[last] * rates[c]
-    sinh = math.sqrt(inertia[b] * d_ba / (inertia[c] * d_ca)) * abs(rates[b] / rates[c])
-    u0 = math.copysign(math.asinh(sinh), -rising)
+    sinh = np.sqrt(b * d_ba / (c * d_ca)) * np.abs(rates[1] / third)
+    u0 = np.copysign(np.arcsinh(sinh), -polhodes.slopes[2] * rates[2])
     shape = root / (1.0 + epsilon)
-    angles = np.arctan(shape * np.tanh(0.5 * (u0 + polhode.pace * times))) - math.atan(
-        shape * math.tanh(0.5 * u0)
-    )
-    return np.asarray(2.0 * polhode.largest / (polhode.pace * size * root) * angles)
+    angles = np.arctan(shape * np.tanh(0.5 * (u0 + pace * times)))
+    angles = angles - np.arctan(shape * np.tanh(0.5 * u0))
+    return np.asarray(2.0 * polhodes.largest / (pace * size * root) * angles)
 
 
-def _shortest(momentum: Array, e: Array) -> Array:
-    """Quaternion of the shortest turn that takes the direction of ``momentum`` (..., 3) to the unit
-    vector ``e``.
+def _shortest(momentum: Array, e: Array) -> tuple[Array, Array, Array, Array]:
+    """Quaternions (4, ...) of the shortest turns that take the directions of ``momentum`` (3, ...)
+    to the unit vectors ``e`` (3, n).
     """
-    size = np.linalg.norm(momentum, axis=-1, keepdims=True)
-    quaternion = np.concatenate([size + momentum @ e[:, None], np.cross(momentum, e)], axis=-1)
-    return np.asarray(
-        quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), dtype=np.float64
-    )
+    (x, y, z), (i, j, k) = momentum, e
+    size = np.sqrt(x * x + y * y + z * z)
+    turn = size + x * i + y * j + z * k, y * k - z * j, z * i - x * k, x * j - y * i
+    length = np.sqrt(sum(part * part for part in turn)) + TINY
+    w, x, y, z = (part / length for part in turn)
+    return w, x, y, z
 
 
-def _turn(rates: Array, times: Array) -> Array:
-    """Quaternions (n, 4) of turns at constant ``rates`` (3,)."""
-    rate = float(np.linalg.norm(rates))
-    half = 0.5 * rate * times
-    direction = rates / rate if rate > 0.0 else rates
-    return np.concatenate([np.cos(half)[..., None], np.sin(half)[..., None] * direction], axis=-1)
-
-
-def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
+def _means(complement: Array) -> tuple[list[tuple[Array, Array]], Array]:
     """Arithmetic and geometric means from 1 and sqrt(1 - m) on, and their limit, π/2 over the
-    quarter period K.
+    quarter period K, (n,) each.
     """
-    arithmetic = 1.0
-    geometric = math.sqrt(complement)
+    arithmetic = np.ones_like(complement)
+    geometric = np.sqrt(complement)
     pairs = [(arithmetic, geometric)]
     for _ in range(MEANS):
-        if (
-            not arithmetic - geometric > 1e-8 * arithmetic
-        ):  # the next difference is the square of this one
+        # the next difference is the square of this one
+        if np.all(arithmetic - geometric <= 1e-8 * arithmetic):
             break
-        arithmetic, geometric = 0.5 * (arithmetic + geometric), math.sqrt(arithmetic * geometric)
+        arithmetic, geometric = 0.5 * (arithmetic + geometric), np.sqrt(arithmetic * geometric)
         pairs.append((arithmetic, geometric))
     return pairs, 0.5 * (arithmetic + geometric)
 
 
-def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
-    """sn, cn, dn of u (n,) by descending Landen transformations (Bulirsch 1965), from 1 - m in [0,
-    1].
+def _jacobi(u: Array, complement: Array) -> tuple[Array, Array, Array]:
+    """sn, cn, dn of u (..., n) by descending Landen transformations (Bulirsch 1965), from 1 - m
+    (n,) in [0, 1].
 
     Taking 1 - m keeps the relative accuracy of cn and dn near m = 1, where scipy.special.ellipj
     leaves its period.
     """
-    if complement == 0.0:
-        decay = np.exp(-np.abs(u))
-        sech = 2.0 * decay / (1.0 + np.square(decay))
-        return np.tanh(u), sech, sech
-    pairs, mean = _means(complement)
+    split = complement == 0.0
+    pairs, mean = _means(np.where(split, 1.0, complement))
     sine = np.sin(mean * u)
     cosine = np.cos(mean * u)
     still = np.abs(sine) < NEGLIGIBLE
@@ -351,8 +393,16 @@ def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
         dn = (geometric + cot) / (arithmetic + cot)
         cot = ratio / arithmetic
     sn = np.copysign(1.0 / np.sqrt(np.square(ratio) + 1.0), sine)
-    return (
+    sn, cn = (
         np.where(still, sine / mean, sn),
         np.where(still, np.copysign(1.0, cosine), ratio * sn),
-        np.where(still, 1.0, dn),
     )
+    dn = np.where(still, 1.0, dn)
+    if np.any(split):
+        decay = np.exp(-np.abs(u))
+        sech = 2.0 * decay / (1.0 + np.square(decay))
+        sn, cn, dn = (
+            np.where(split, limit, each)
+            for limit, each in ((np.tanh(u), sn), (sech, cn), (sech, dn))
+        )
+    return sn, cn, dn

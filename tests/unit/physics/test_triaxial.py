@@ -118,10 +118,11 @@ def off(first: reference.Array, second: reference.Array) -> float:
 def test_jacobi_functions_are_those_of_scipy() -> None:
     u = np.linspace(-20.0, 20.0, 401)
     for m in (0.0, 1e-12, 0.1, 0.5, 0.9, 0.999):
-        assert np.array(triaxial._jacobi(u, 1.0 - m)) == pytest.approx(
+        complement = np.array([1.0 - m])
+        assert np.array(triaxial._jacobi(u, complement)) == pytest.approx(
             np.array(ellipj(u, m)[:3]), abs=5e-14
         )
-        assert 0.5 * math.pi / triaxial._means(1.0 - m)[1] == pytest.approx(
+        assert 0.5 * math.pi / triaxial._means(complement)[1] == pytest.approx(
             float(ellipk(m)), rel=1e-14
         )
 
@@ -203,6 +204,40 @@ def test_on_the_separatrix_it_ends_in_a_spin_about_the_middle_axis(rates0: list[
     assert moments[1] * abs(end[1]) == pytest.approx(
         np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14
     )
+
+
+def test_bodies_together_move_as_each_alone() -> None:
+    """On the separatrix, beside it, nearly symmetric, symmetric, a sphere, at rest."""
+    random = np.random.default_rng(12)
+    rows = [([1.5, 2.0, 3.0], rates0) for rates0 in ON_SEPARATRIX]
+    rows += [([1.5, 2.0, 3.0], [0.5, 0.375, 0.25 * (1.0 + nudge)]) for nudge in NUDGES]
+    rows += [row[:2] for near in NEARLY.values() for row in near]
+    rows += [([2.0, 2.0, 1.0], [0.1, 0.2, 0.7]), ([1.0, 1.0, 1.0], [0.1, 0.2, 0.7])]
+    rows += [([1.5, 2.0, 3.0], [0.0, 0.0, 0.0]), ([1.5, 2.0, 3.0], [0.0, -2.0, 0.0])]
+    for _ in range(20):
+        x, y, z = random.uniform(0.05, 1.0, 3)
+        rows.append(([y + z, z + x, x + y], random.uniform(-2.0, 2.0, 3).tolist()))
+    moments, rates0 = (np.array(each).T for each in zip(*rows, strict=True))
+    times = random.uniform(-30.0, 30.0, len(rows))
+    starts = random.normal(size=(4, len(rows)))
+    starts /= np.linalg.norm(starts, axis=0)
+    rates, quaternions = triaxial.coasts(moments, rates0, starts, times)
+    for one in range(len(rows)):
+        body, rates_of_one, start = (each[:, [one]] for each in (moments, rates0, starts))
+        alone = triaxial.coasts(body, rates_of_one, start, times[[one]])
+        assert rates[:, one] == pytest.approx(alone[0][:, 0], abs=1e-13)
+        assert quaternions[:, one] == pytest.approx(alone[1][:, 0], abs=1e-13)
+    # and as motion moves them, in steps of series that a weak torque asks for
+    far = rates0.any(axis=0)
+    bodies = Bodies(moments[:, far], np.zeros(3))
+    moved = [
+        MotionStretch(each, np.zeros(far.sum()), rates0[:, far].copy(), starts[:, far].copy())
+        for each in (bodies, Bodies(bodies.moments, np.array([0.0, 0.0, 1e-300])))
+    ]
+    for each in moved:
+        advance(each, np.abs(times[far]))
+    assert moved[0].rates == pytest.approx(moved[1].rates, abs=1e-11)
+    assert moved[0].quaternion == pytest.approx(moved[1].quaternion, abs=1e-11)
 
 
 @given(moments=bodies, rates0=turns, late=st.floats(0.0, 300.0))
