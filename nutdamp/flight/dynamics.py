@@ -150,8 +150,8 @@ LEG, PULSE = (
     0.4,
 )  # units of `work` of a leg of a flight, and additional ones of an integrated leg
 
-SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
-"""Units of a step of a symmetric body, of any other, and of one with dissipation."""
+STEP, SUNK_STEP = 0.2, 0.7
+"""Units of a step of integration, and of one with dissipation."""
 
 REMEMBERED = 1000  # legs that are remembered, before all are forgotten
 
@@ -255,8 +255,8 @@ class Dynamics:
         if self.forcing.timed:
             return self._between_edges(stretch, state, end, push, most)
         pieces = tuple(motion.polynomials(stretch, end - start, most))
-        step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
-        work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
+        step = SUNK_STEP if self.forcing.growth != 0.0 else STEP
+        work.spend(PULSE + step * len(pieces))
         path = Joined([(piece.start, piece.motion) for piece in pieces], len(pieces))
         return path, SpinState.of(*pieces[-1].end())
 

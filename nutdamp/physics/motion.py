@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,6 @@ from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude
 from nutdamp.physics.series import Bodies, Falling, Forcing, Polynomial, Series
-
-if TYPE_CHECKING:
-    from nutdamp.physics.driven import Drive
 
 Array = NDArray[np.float64]
 
@@ -34,8 +31,6 @@ HALVINGS = 40
 AT_REST = 1e-9
 LONGEST = 3e5  # largest angle of one integration, rad: some hundred thousand steps
 MOST_STEPS = 400_000  # of one integration: enough for `LONGEST` whatever the rates on the way
-SHORT = 8.0  # angle up to which steps of one body in turn are quicker than all at once, rad
-FEW = 256  # cases up to which steps summed at once cost less than the calls of steps in turn
 
 
 # cases flown together: enough to hide the cost of calls, few enough that their series stay in the
@@ -204,9 +199,6 @@ def advance(here: MotionStretch, duration: Any) -> None:
 
         rates[:], quaternion[:] = triaxial.coasts(bodies.moments, rates, quaternion, duration)
         return
-    if quaternion.ndim == 2 and len(here.since) <= FEW and _steady(here):
-        _advance_symmetric(here, duration)
-        return
     for piece in polynomials(here, duration):
         last = piece
     rates[:], quaternion[:] = last.end()
@@ -217,12 +209,6 @@ def _left_alone(here: MotionStretch) -> bool:
     (turning, growth, wheel, _, timed), constant = here.bodies.forcing, here.bodies.constant
     driven = turning or timed or growth != 0.0 or np.any(wheel) or constant.any()
     return not driven and here.torque is None and here.falling is None
-
-
-def _steady(here: MotionStretch) -> bool:
-    """True for symmetric bodies under constant and turning torques without dissipation."""
-    constant = here.jerk is None and here.falling is None
-    return constant and here.bodies.forcing.growth == 0.0 and here.bodies.symmetric
 
 
 def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> Iterator[Polynomial]:
@@ -244,9 +230,6 @@ def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> I
     turning = np.abs(forcing.wheel) / lightest
     turning = max((abs(rate) for _, rate in forcing.turning), default=0.0) + turning
     angle = float(np.max(np.maximum(_size(rates) + pushed, turning) * duration))
-    if rates.ndim == 1 and angle > SHORT and _steady(here):
-        yield from _symmetric_polynomials(here, duration, most)
-        return
     floor = 0.0
     if forcing.growth != 0.0:
         size = _size(moments * rates) + np.abs(forcing.wheel)
@@ -301,75 +284,3 @@ def _refused(here: MotionStretch, duration: Any, angle: float | None = None) -> 
         f"the motion {whose} {why} to be integrated; shorten the time, "
         "or look for a torque or rate that is too large"
     )
-
-
-def _drive(here: MotionStretch) -> Drive:
-    """Drive of symmetric bodies; that of one as of an array of one."""
-    from nutdamp.physics.driven import Drive
-
-    A, _, C = here.bodies.moments.reshape(3, -1)
-    first, second, third = here.acceleration.reshape(3, -1)
-    forcing = here.bodies.forcing
-    turning = tuple((np.asarray(size / A), rate) for size, rate in forcing.turning)
-    return Drive(1.0 - C / A, first + 1j * second, third, turning, forcing.wheel / A)
-
-
-def _advance_symmetric(here: MotionStretch, duration: Array) -> None:
-    """`advance` by many steps at once."""
-    from nutdamp.physics import driven  # many cases, or long pulses
-
-    rates, quaternion = here.rates, here.quaternion
-    drive = _drive(here)
-    omega = rates[0] + 1j * rates[1]
-    spin = rates[2]
-    angle = float(np.max(drive.pace(omega, spin, duration) * duration))
-    if not angle <= LONGEST:
-        raise _refused(here, duration, angle)
-    turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])
-    try:
-        omega, rates[2], (first, second) = driven.end(
-            drive, omega, spin, turned, here.since, duration
-        )
-    except driven.NotConverged:
-        raise _refused(here, duration) from None
-    rates[:2] = omega.real, omega.imag
-    quaternion[:] = first.real, second.real, second.imag, first.imag
-
-
-def _symmetric_polynomials(here: MotionStretch, time: float, most: int) -> Iterator[Polynomial]:
-    """`polynomials` of one body, many steps at once."""
-    from nutdamp.physics import driven  # long pulses
-
-    drive = _drive(here)
-    omega, spin = np.array([complex(here.rates[0], here.rates[1])]), here.rates[2:]
-    start, duration = np.array([here.since]), np.array([time])
-    angle = float(drive.pace(omega, spin, duration)[0]) * time
-    if angle > most * driven.DRIVEN_STRIDE and most < MOST_STEPS:
-        raise _refused(here, time)
-    if not angle <= LONGEST:
-        raise _refused(here, time, angle)
-    count = driven.count_for(drive, omega, spin, duration)
-    quaternion, done = here.quaternion, 0
-    try:
-        for steps in driven.steps(drive, omega, spin, start, duration, count):
-            done += len(steps.starts)
-            if done > most:
-                raise _refused(here, time)
-            turn = steps.turn[..., 0]  # (k, 2, s)
-            if done > 1:
-                before = driven.in_turn(turn.sum(axis=0)[:, :-1, None])[..., 0]
-                later = driven.product(before[:, None], np.moveaxis(turn, 1, 0)[:, :, 1:])
-                turn[:, :, 1:] = np.moveaxis(later, 0, 1)
-            p, r = turn[:, 0], turn[:, 1]
-            terms = np.zeros((*p.shape, 7))  # (k, s, 7)
-            turned = np.stack([p.real, r.real, r.imag, p.imag], axis=-1)
-            terms[..., :4] = attitude.multiply(quaternion, turned)
-            terms[..., 4], terms[..., 5] = steps.omega[..., 0].real, steps.omega[..., 0].imag
-            terms[:2, :, 6] = steps.spin[..., 0]
-            step = float(steps.duration[0])
-            for number, begin in enumerate(steps.starts[:, 0].tolist()):
-                piece = Polynomial(begin, step, terms[:, number])
-                yield piece
-            quaternion = piece.end()[1]
-    except driven.NotConverged:
-        raise _refused(here, time) from None

@@ -22,7 +22,6 @@ from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.propagated import Pulses
 from nutdamp.montecarlo.propagated import fly_pulses as fly
 from nutdamp.physics import attitude
-from nutdamp.physics import driven as taylor
 from nutdamp.physics.motion import BLOCK, MotionStretch, advance, polynomials
 from nutdamp.physics.series import NOTHING, Bodies, Falling, Forcing
 from nutdamp.physics.sky import AxisWatch
@@ -169,26 +168,6 @@ def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, in
         assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(
             alone, abs=1e-12
         )
-
-
-def test_the_pace_bounds_what_turns_with_a_torque_too() -> None:
-    none, rest = np.zeros(1), np.zeros(1, dtype=complex)
-    drive = taylor.Drive(none, rest, none, ((np.array([0.01 + 0j]), -7.0),))
-    assert drive.pace(np.array([0.2j]), np.array([-0.5]), np.ones(1))[0] > 7.0 + 0.5 + 0.2
-
-
-def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> None:
-    """A sphere at rest, spun up by so much that its last turns are much faster than the first."""
-    drive = taylor.Drive(np.array([0.0]), np.array([0.3 + 0.1j]), np.array([0.0]))
-    rest = np.zeros(1, dtype=complex)
-    none = np.zeros(1)
-    duration = np.array([40.0])
-    steps = list(taylor.steps(drive, rest, none, none, duration, 1))
-    assert steps[0].duration[0] < 40.0 / taylor.count_for(drive, rest, none, duration)
-    assert sum(len(one.starts) * one.duration[0] for one in steps) == pytest.approx(40.0)
-    turn = taylor.whole(np.concatenate([one.turn.sum(axis=0) for one in steps], axis=1))
-    angle = 0.5 * abs(0.3 + 0.1j) * 40.0**2  # about one axis: the turn is that of the angle
-    assert turn[0, 0] == pytest.approx(math.cos(0.5 * angle), abs=1e-11)
 
 
 # --- many cases at once against the independent integrator, case by case; their spin axes over long
