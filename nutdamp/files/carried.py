@@ -40,9 +40,8 @@ from nutdamp.files.editing import (
     motion_edits,
     overlay,
 )
-from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source
-from nutdamp.files.yaml import Node, Place, read_tree
+from nutdamp.files.yaml import KeyPath, Node, Place, read_tree
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Trapezoid

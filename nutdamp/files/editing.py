@@ -26,8 +26,7 @@ import yaml
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, SenselessOption, cure_of
-from nutdamp.files.fields import KeyPath
-from nutdamp.files.yaml import MAX_DEPTH, Node, Place, dotted, read_tree, read_value
+from nutdamp.files.yaml import MAX_DEPTH, KeyPath, Node, Place, dotted, read_tree, read_value
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft, Vector

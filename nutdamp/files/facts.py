@@ -8,18 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.files.fields import SMALLEST, KeyPath
-from nutdamp.files.keys import thrust_behind
-from nutdamp.files.yaml import Node
+from nutdamp.files.fields import SMALLEST, Finding, Values
+from nutdamp.files.keys import SPACECRAFT, thrust_behind
+from nutdamp.files.yaml import KeyPath, Node
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.units import parse
 
 Vector = NDArray[np.float64]
 
@@ -30,26 +28,21 @@ SYMMETRIC = 1e-9
 """Asymmetry of a tensor, over its largest entry, that ten printed digits leave."""
 
 
-class Finding(NamedTuple):
-    """Something wrong at ``path``, which need not exist; ``at_key``: the key and not its value."""
-
-    path: KeyPath
-    problem: str
-    at_key: bool = False
-
-
-class Facts:
-    """The values of a tree that can be read, in SI."""
+class Facts(Values):
+    """The values of a spacecraft file by path, and what follows from them."""
 
     def __init__(self, root: Node) -> None:
-        self.root = root
+        super().__init__(root)
+        self.contents = self.read(SPACECRAFT, root)
 
     def has(self, *path: str | int) -> bool:
         """True where something is at ``path``."""
         return self.root.get(*path) is not None
 
     def value(self, *path: str | int) -> object:
-        """The text, number, dict or list of nodes at ``path``; None where there is none."""
+        """The text, number, dict or list of nodes at ``path`` as it is written; None where there is
+        none.
+        """
         node = self.root.get(*path)
         return None if node is None else node.value
 
@@ -58,20 +51,17 @@ class Facts:
         value = self.value(*path)
         return value if isinstance(value, str) else None
 
-    def number(self, kind: str, *path: str | int) -> float | None:
-        """The quantity at ``path``."""
-        node = self.root.get(*path)
-        try:
-            return None if node is None else parse(node.plain(), kind)
-        except ValueError:
-            return None
+    def number(self, *path: str | int) -> float | None:
+        """The quantity at ``path``, SI; None where there is none, or no sound one."""
+        value = self.by_path.get(path)
+        return value if isinstance(value, float) else None
 
-    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
-        """The ``size`` quantities at ``path``; None unless all can be read."""
-        if len(self.below(*path)) != size:
+    def vector(self, *path: str | int) -> Vector | None:
+        """The quantities in the list at ``path``; None unless all can be read."""
+        entries = self.by_path.get(path)
+        if not isinstance(entries, list) or None in entries:
             return None
-        numbers = [self.number(kind, *path, index) for index in range(size)]
-        return None if None in numbers else np.array(numbers, dtype=np.float64)
+        return np.array(entries, dtype=np.float64)
 
     def below(self, *path: str | int) -> list[KeyPath]:
         """Paths of the entries at ``path``."""
@@ -94,10 +84,8 @@ class Facts:
     @cached_property
     def tensor(self) -> Vector | None:
         """The inertia tensor (3, 3) kg m²."""
-        rows = [self.vector("inertia", 3, "inertia", "tensor", row) for row in range(3)]
-        if len(self.below("inertia", "tensor")) != 3 or any(row is None for row in rows):
-            return None
-        return np.array(rows)
+        rows = [self.vector(*row) for row in self.below("inertia", "tensor")]
+        return None if len(rows) != 3 or any(row is None for row in rows) else np.array(rows)
 
     @cached_property
     def principal(self) -> tuple[rigid_body.Moments, Vector] | None:
@@ -105,8 +93,8 @@ class Facts:
         if self.tensor is not None:
             sound = tensor_fault(self.tensor) is None
             return rigid_body.principal_axes(symmetric(self.tensor)) if sound else None
-        A, C = (self.number("inertia", "inertia", key) for key in "AC")
-        return None if A is None or C is None or A <= 0.0 or C <= 0.0 else ((A, A, C), np.eye(3))
+        A, C = self.number("inertia", "A"), self.number("inertia", "C")
+        return None if A is None or C is None else ((A, A, C), np.eye(3))
 
     @cached_property
     def inertia(self) -> Inertia | None:
@@ -121,14 +109,14 @@ class Facts:
     @cached_property
     def wheel(self) -> float:
         """Momentum of the wheel, N m s; zero where there is none."""
-        return self.number("momentum", "wheel", "momentum") or 0.0
+        return self.number("wheel", "momentum") or 0.0
 
     @cached_property
     def stated_spin(self) -> tuple[KeyPath, float | None]:
         """The rate about principal axis 3, rad/s, and its path; a rate that is rounding is zero."""
         if not self.has("omega0"):
-            return ("state", "spin"), self.number("rate", "state", "spin")
-        omega0 = self.vector("rate", 3, "omega0")
+            return ("state", "spin"), self.number("state", "spin")
+        omega0 = self.vector("omega0")
         if omega0 is None or (self.tensor is not None and self.principal is None):
             return ("omega0",), None
         if self.tensor is None or self.principal is None:
@@ -155,14 +143,13 @@ class Facts:
         """Thrust in N of each thruster and of the torquer; None where it is not known."""
         forces: dict[str, float | None] = {}
         for name, path in self.names["thruster"].items():
-            torque = self.vector("torque", 3, *path, "torque")
+            torque = self.vector(*path, "torque")
             size = None if torque is None else math.hypot(*torque)
-            lever = self.number("length", *path, "lever_arm") or None
-            forces[name] = self.number("force", *path, "force") or thrust_behind(size, lever)
+            lever = self.number(*path, "lever_arm")
+            forces[name] = self.number(*path, "force") or thrust_behind(size, lever)
         if self.has("steerable") or not self.below("thrusters"):
-            lever = self.number("length", "steerable", "lever_arm") or None
-            size = self.number("torque", "steerable", "torque")
-            forces[STEERABLE] = thrust_behind(size, lever)
+            size = self.number("steerable", "torque")
+            forces[STEERABLE] = thrust_behind(size, self.number("steerable", "lever_arm"))
         return forces
 
 

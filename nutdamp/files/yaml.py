@@ -22,8 +22,10 @@ from yaml.reader import Reader, ReaderError
 from yaml.scanner import Scanner
 
 from nutdamp.errors import CannotRead, Fault, FaultyFile
-from nutdamp.files.fields import KeyPath as KeyPath
 from nutdamp.units import shown
+
+KeyPath = tuple[str | int, ...]
+"""Keys and list positions that lead from the root to a value."""
 
 STDIN = "-"  # file name that means standard input
 

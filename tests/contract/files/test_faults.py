@@ -22,7 +22,7 @@ from support.golden import check_text
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
 from nutdamp.files.editing import overlay, parse_setting, settings_of
-from nutdamp.files.keys import LoopFaultsSection, LoopSection, LoopSensorSection
+from nutdamp.files.keys import LOOP, LOOP_FAULTS, LOOP_SENSOR
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
 from nutdamp.files.yaml import read_tree
 
@@ -367,9 +367,9 @@ def looped(sensor: str, *settings: str) -> nutdamp.Spacecraft:
 
 
 def test_senseless_values_of_every_key_are_refused_where_they_stand() -> None:
-    keys = {key for key in LoopSection.fields() if key not in ("sensor", "faults")}
-    keys |= {f"sensor.{key}" for key in LoopSensorSection.fields()}
-    assert set(SENSELESS) == keys | {f"faults.{key}" for key in LoopFaultsSection.fields()}
+    keys = {key for key in LOOP.keys if key not in ("sensor", "faults")}
+    keys |= {f"sensor.{key}" for key in LOOP_SENSOR.keys}
+    assert set(SENSELESS) == keys | {f"faults.{key}" for key in LOOP_FAULTS.keys}
     for name, sensor, table in (
         ("gyro", GYRO, SENSELESS),
         (

@@ -21,7 +21,7 @@ from support.contract import BASE, Write, check_faults
 from support.golden import check_text
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.keys import SPACECRAFT
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE, read_pulses
 from nutdamp.flight import propagation
@@ -403,7 +403,7 @@ def test_the_example_is_the_one_it_describes_and_shows_every_key() -> None:
     # A handful of pulses of an eighth of the nutation period each removes the nutation.
     assert 2 < craft.least_impulse / (8.0 * craft.body_period / 8) < 6
     sections = [json_schema(), *json_schema()["$defs"].values()]
-    assert sections[0]["properties"].keys() == SpacecraftFile.fields().keys()
+    assert sections[0]["properties"].keys() == SPACECRAFT.keys.keys()
     for section in sections:
         for key in section["properties"]:
             assert re.search(rf"\b{key}:", example_text()), key

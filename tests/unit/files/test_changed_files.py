@@ -32,9 +32,8 @@ from nutdamp.files.carried import fitted_text, later, notes
 from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.ccsds.write import merge
 from nutdamp.files.editing import edited, parse_setting
-from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source, example_text, read_spacecraft
-from nutdamp.files.yaml import dotted, read_tree
+from nutdamp.files.yaml import KeyPath, dotted, read_tree
 from nutdamp.flight.dynamics import supplied
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Trapezoid
