@@ -21,7 +21,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import Table
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
-from nutdamp.files.tabular import csv_text, structured, whole_file
+from nutdamp.files.tabular import csv_text, number_rows, structured, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propagation import Flight
@@ -341,14 +341,8 @@ class SamplesWriter:
         """The cases from ``first`` (from 0) on, with their `Results.values`."""
         for begin in range(0, values.shape[1], BLOCK):  # texts of all would take much memory
             part = values[:, begin : begin + BLOCK]
-            columns = map(_texts, sample_columns(self._study, first + begin, part))
-            lines = map(",".join, zip(*columns, strict=True))
-            self._stream.write(("\r\n".join(lines) + "\r\n").encode())
-
-
-def _texts(values: NDArray[Any]) -> list[str]:
-    """Numbers that read back as they were; NaN is empty."""
-    return [""] * len(values) if math.isnan(values[0]) else list(map(repr, values.tolist()))
+            columns = sample_columns(self._study, first + begin, part)
+            self._stream.write(number_rows(columns))
 
 
 class FlownCases(Protocol):

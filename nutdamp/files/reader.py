@@ -22,13 +22,12 @@ import numpy as np
 
 from nutdamp import units
 from nutdamp.errors import Fault, FaultyFile, in_order, warn
-from nutdamp.files.facts import CANCELLED, Facts, Vector, force_vector, symmetric
+from nutdamp.files.facts import CANCELLED, Facts, Vector, force_vector
 from nutdamp.files.fields import Finding, definitions
 from nutdamp.files.keys import SPACECRAFT, dispersions, thrust_behind
 from nutdamp.files.rules import correlation_findings, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude
-from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.equipment import (
     Channel,
     Commands,
@@ -100,8 +99,8 @@ def _contents(
     settings: Sequence[Setting],
     warn: Warn,
     aimed: bool,
-) -> tuple[Any, Node]:
-    """The contents of a file without faults, and its tree."""
+) -> Facts:
+    """The values of a file without faults."""
     root, faults = read_tree(text, name)
     if settings:
         from nutdamp.files.editing import overlay  # keys set beside the file
@@ -120,7 +119,7 @@ def _contents(
         warn(doubt)
     if faults:
         raise FaultyFile(faults)
-    return facts.contents, root
+    return facts
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
@@ -156,13 +155,10 @@ def read_spacecraft(
     """The spacecraft in the text of a file ``name``, with ``settings``; ``aimed``: its target is
     given beside them. Raises `FaultyFile` with all faults.
     """
-    contents, root = _contents(text, name, settings, warn, aimed)
-    stated = contents.inertia
-    tensor = np.diag(np.array([stated.A, stated.A, stated.C], dtype=float))
-    if stated.tensor is not None:
-        tensor = symmetric(np.array(stated.tensor))
-    moments, axes = principal_axes(tensor)
-    inertia = Inertia(moments, axes, 0.0 if contents.wheel is None else contents.wheel.momentum)
+    facts = _contents(text, name, settings, warn, aimed)
+    contents, inertia = facts.contents, facts.inertia
+    assert inertia is not None
+    axes = inertia.axes
     omega0 = _rates(contents, inertia)
     center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
     thrusters = {
@@ -176,18 +172,12 @@ def read_spacecraft(
         if sunward is None or np.linalg.norm(np.cross(axis, sunward)) < ALONG:
             problem = "the Sun lies along spin_axis, which has no side of the Sun then; give phase"
             finding = Finding(("attitude", "sun_phase"), problem, True)
-            raise FaultyFile([_placed(finding, root, name)])
+            raise FaultyFile([_placed(finding, facts.root, name)])
+    cold, tank = _feed(contents)
     torquer = steerable if thrusters else steerable or Steerable()
     required = contents.requirement
-    asks_nothing = required is None or all(
-        bound is None
-        for bound in (
-            required.nutation,
-            required.momentum_shift,
-            required.pointing,
-            required.spin,
-        )
-    )
+    bounds = ("nutation", "momentum_shift", "pointing", "spin")
+    asks = any(getattr(required, bound, None) is not None for bound in bounds)
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
@@ -202,7 +192,7 @@ def read_spacecraft(
             for name, members in channels.items()
         ),
         steerable=steerable,
-        requirement=None if asks_nothing else _part(Requirement, required),
+        requirement=_part(Requirement, required) if asks else None,
         limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ()))
         or Limits(),
         disturbances=tuple(
@@ -216,8 +206,8 @@ def read_spacecraft(
             contents.orbit,
             lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper()),
         ),
-        cold=_given(contents.cold, _cold),
-        tank=_given(contents.tank, _tank),
+        cold=cold,
+        tank=tank,
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
         sun_sensor=_given(contents.sun_sensor, _sun_sensor, axes),
@@ -225,7 +215,7 @@ def read_spacecraft(
         loop=_given(contents.loop, _loop, axes, center),
         document=contents,
     )
-    faults = [_placed(finding, root, name) for finding in correlation_findings(spacecraft)]
+    faults = [_placed(finding, facts.root, name) for finding in correlation_findings(spacecraft)]
     if faults:
         raise FaultyFile(faults)
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
@@ -347,23 +337,21 @@ def _thruster(entry: Any, axes: Vector, every: Any, center: Vector) -> Thruster:
     )
 
 
-def _cold(section: Any) -> Cold | None:
-    from nutdamp.physics.thruster import Cold  # cold nozzles
+def _feed(contents: Any) -> tuple[Cold | None, Tank | None]:
+    """Cold nozzles, and a tank in blowdown."""
+    tank = contents.tank
+    if contents.cold is None and tank is None:
+        return None, None
+    from nutdamp.physics.thruster import Cold, Tank
 
-    return _part(Cold, section)
-
-
-def _tank(section: Any) -> Tank | None:
-    from nutdamp.physics.thruster import Tank  # a tank in blowdown
-
-    isp, shed = section.isp, section.inertia_per_kg
-    rows = (shed.A, shed.A, shed.C) if isinstance(shed, SimpleNamespace) else tuple(shed or ())
-    return _part(
-        Tank,
-        section,
-        isp=isp and tuple(map(tuple, isp)),
-        inertia_per_kg=rows if any(rows) else None,
-    )
+    cold = _part(Cold, contents.cold)
+    if tank is None:
+        return cold, None
+    rows = tank.inertia_per_kg or ()
+    if isinstance(rows, SimpleNamespace):
+        rows = (rows.A, rows.A, rows.C)
+    isp = tank.isp and tuple(map(tuple, tank.isp))
+    return cold, _part(Tank, tank, isp=isp, inertia_per_kg=tuple(rows) if any(rows) else None)
 
 
 def _valve(entry: Any, every: Any, thrust: float | None) -> Valve | None:

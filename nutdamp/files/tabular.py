@@ -185,14 +185,24 @@ def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
     return structured(HEADER, [*table.T, track.pulse])
 
 
+def number_rows(columns: Iterable[NDArray[Any]]) -> bytes:
+    """Rows of CSV of columns (n,) of numbers, which read back as they were; a column of NaN is
+    empty.
+    """
+    texts = (
+        [""] * len(column) if math.isnan(column[0]) else map(repr, column.tolist())
+        for column in columns
+    )
+    return "".join(f"{','.join(row)}\r\n" for row in zip(*texts, strict=True)).encode()
+
+
 def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) -> None:
     """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
     stream.write(f"{','.join(HEADER)}\r\n".encode())
     for piece in pieces:
         if len(piece.t):
-            # Finite numbers each by their repr: the shortest text that reads back the same.
-            rows = repr(track_array(piece, inertia).tolist())[2:-2]
-            stream.write(rows.replace("), (", "\r\n").replace(", ", ",").encode() + b"\r\n")
+            rows = track_array(piece, inertia)
+            stream.write(number_rows(rows[name] for name in HEADER))
 
 
 LARGEST = 1e15  # larger magnitudes are nothing of a spacecraft, and would overflow later
