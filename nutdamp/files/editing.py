@@ -22,7 +22,6 @@ from numbers import Integral, Real
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-import yaml
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, SenselessOption, cure_of
@@ -330,79 +329,53 @@ def edited(
     for path, value in values.items():
         text = _with(text, path, value)
     for old, new in (renamed or {}).items():
-        key, _ = _find(_root(text), old)
-        if key is not None:
-            text = text[: key.start_mark.index] + new + text[key.end_mark.index :]
+        place = read_tree(text, "edited")[0].keys.get(old)
+        if place is not None:
+            begin = text[: place.offset]
+            text = begin + re.sub(rf"""^(['"]?){old}\1""", new, text[place.offset :])
     return text
 
 
 def _with(text: str, path: KeyPath, value: str) -> str:
-    held: yaml.Node = _root(text)
+    held = read_tree(text, "edited")[0]
     indent = ""
     for depth, step in enumerate(path):
-        key, node = _find(held, step)
+        node = held.get(step)
         if node is None:
             return _added(text, held, path[depth:], value)
         where = dotted(path[: depth + 1])
-        begins = node.start_mark.index
-        if key is not None and begins < key.end_mark.index:
+        key = held.keys.get(str(step))
+        if key is not None and node.place.offset < key.offset:
             raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
-        anchor = re.match(r"&(\S+)", text[begins:])
+        anchor = re.match(r"&(\S+)", text[node.place.offset :])
         if anchor and f"*{anchor[1]}" in text:
             raise BadRequest(
                 f"{where} has the alias *{anchor[1]}: write that out, for it to be changed"
             )
-        held = node
         # The entries of a block may stand as far left as its key; a flow value may not.
         indent = ""
-        if key is not None and node.start_mark.line > key.start_mark.line:
-            indent = "  " if node.start_mark.column <= key.start_mark.column else ""
-    return text[: held.start_mark.index] + indent + value + text[_end(held) :]
+        if key is not None and node.place.line > key.line and node.place.column <= key.column:
+            indent = "  "
+        held = node
+    return text[: held.place.offset] + indent + value + text[held.end :]
 
 
-def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:
+def _added(text: str, parent: Node, path: KeyPath, value: str) -> str:
     """The text with a new key in a mapping; further steps of the path become flow mappings."""
     for step in reversed(path[1:]):
         value = f"{{{key_text(step)}: {value}}}"
     entry = f"{key_text(path[0])}: {value}"
-    if not isinstance(parent, yaml.MappingNode):
+    if not isinstance(parent.value, dict):
         raise BadRequest(f"{dotted(path)}: its parent holds no keys")
-    if parent.flow_style:
-        last = _end(parent) - 1
+    if parent.flow:
+        last = parent.end - 1
         comma = "" if not parent.value or text[:last].rstrip().endswith(",") else ", "
         at = len(text[:last].rstrip()) if comma else last
         return text[:at] + comma + entry + text[at:]
-    line_end = text.find("\n", _end(parent))
+    line_end = text.find("\n", parent.end)
     at = len(text) if line_end < 0 else line_end
-    indent = " " * parent.value[0][0].start_mark.column
+    indent = " " * (next(iter(parent.keys.values())).column - 1)
     return f"{text[:at]}\n{indent}{entry}{text[at:]}"
-
-
-def _root(text: str) -> yaml.MappingNode:
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
-    assert isinstance(root, yaml.MappingNode)
-    return root
-
-
-def _find(parent: yaml.Node, step: str | int) -> tuple[yaml.Node | None, yaml.Node | None]:
-    """The key, of a mapping, and the value at a step; None where there is none."""
-    if isinstance(parent, yaml.MappingNode):
-        return next(
-            ((name, value) for name, value in parent.value if name.value == step), (None, None)
-        )
-    if isinstance(parent, yaml.SequenceNode) and isinstance(step, int) and step < len(parent.value):
-        return None, parent.value[step]
-    return None, None
-
-
-def _end(node: yaml.Node) -> int:
-    """End of the text of a value; of a block, that of its last entry."""
-    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
-        last = node.value[-1]
-        return _end(last[1] if isinstance(node, yaml.MappingNode) else last)
-    if isinstance(node, yaml.ScalarNode) and node.style in ("|", ">"):
-        return node.end_mark.index - 1
-    return int(node.end_mark.index)
 
 
 def key_text(step: str | int) -> str:

@@ -70,13 +70,14 @@ MAX_DEPTH = 32
 
 
 class Place(NamedTuple):
-    """Line and column of a value, both from 1, 0 where there are none; or the name of a ``setting``
-    beside the file.
+    """Line and column of a value, both from 1, 0 where there are none, and its ``offset`` in the
+    text; or the name of a ``setting`` beside the file.
     """
 
     line: int = 0
     column: int = 0
     setting: str = ""
+    offset: int = 0
 
     def __str__(self) -> str:
         return self.setting or f"line {self.line}, column {self.column}"
@@ -91,12 +92,16 @@ Scalar = str | int | float | bool | None
 
 @dataclass(slots=True)
 class Node:
-    """A value and where it is; ``keys`` holds the places of a mapping's keys."""
+    """A value and where it is, up to the offset ``end`` of the text; ``keys`` holds the places of a
+    mapping's keys, ``flow`` is True of what stands in brackets or braces.
+    """
 
     value: Scalar | dict[str, Node] | list[Node]
     place: Place
     keys: dict[str, Place] = field(default_factory=dict)
     size: int = 1
+    end: int = 0
+    flow: bool = False
 
     def get(self, *path: str | int) -> Node | None:
         """The node at ``path`` below this one; None where there is none."""
@@ -298,7 +303,9 @@ class _Builder:
         if event.anchor is not None:
             self.anchors[event.anchor] = None
         if isinstance(event, yaml.ScalarEvent):
-            node = Node(self.scalar(event, path), place)
+            # the text of a block ends in a line break
+            end = _at(event.end_mark).offset - (event.style in ("|", ">"))
+            node = Node(self.scalar(event, path), place, end=end)
         elif isinstance(event, yaml.SequenceStartEvent):
             node = self.sequence(event, path)
         else:
@@ -330,7 +337,7 @@ class _Builder:
         entries: list[Node] = []
         while not isinstance(entry := self.next(), yaml.SequenceEndEvent):
             entries.append(self.node(entry, (*path, len(entries))))
-        return Node(entries, _at(event.start_mark), size=1 + sum(entry.size for entry in entries))
+        return self.collection(entries, entries, event, entry)
 
     def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
         """A mapping, up to its end event;
@@ -354,9 +361,22 @@ class _Builder:
                 self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
             else:
                 values[text], keys[text] = value, place
-        return Node(
-            values, _at(event.start_mark), keys, 1 + sum(node.size for node in values.values())
-        )
+        node = self.collection(values, [*values.values()], event, key)
+        node.keys = keys
+        return node
+
+    def collection(
+        self,
+        value: dict[str, Node] | list[Node],
+        entries: list[Node],
+        begin: yaml.CollectionStartEvent,
+        end: yaml.Event,
+    ) -> Node:
+        """A list or mapping between two events; a block ends with its last entry."""
+        size = 1 + sum(entry.size for entry in entries)
+        flow = bool(begin.flow_style) or not entries
+        last = _at(end.end_mark).offset if flow else entries[-1].end
+        return Node(value, _at(begin.start_mark), size=size, end=last, flow=flow)
 
     def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
         """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag
@@ -464,7 +484,7 @@ _SYNTAX = (
 
 def _at(mark: Any) -> Place:
     """Place of a mark, which PyYAML counts from 0; (0, 0) where it gave none."""
-    return Place() if mark is None else Place(mark.line + 1, mark.column + 1)
+    return Place() if mark is None else Place(mark.line + 1, mark.column + 1, offset=mark.index)
 
 
 def _place(text: str, position: int) -> Place:
