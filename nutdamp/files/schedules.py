@@ -221,14 +221,13 @@ def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Sched
 def _warn_of_contradictions(row: Row, pulse: Pulse, axes: Vector) -> None:
     """Name the columns of a row that say something else than its start, on-time and channel."""
     assert pulse.torque is not None
-    values = {"t_s": pulse.t} if row.get("start_s") else {}
-    sizes = {"t_s": pulse.on_time}
-    for columns, vector in ((TORQUE, pulse.torque), (IMPULSE, pulse.impulse)):
-        values |= dict(zip(columns, (axes @ vector).tolist(), strict=True))
-        sizes |= dict.fromkeys(columns, float(np.linalg.norm(vector)))
-    for column, value in values.items():
+    follows = [("t_s", pulse.t, pulse.on_time)] if row.get("start_s") else []
+    for columns, vector in ((TORQUE, axes @ pulse.torque), (IMPULSE, axes @ pulse.impulse)):
+        size = math.hypot(*vector)
+        follows += [(column, value, size) for column, value in zip(columns, vector, strict=True)]
+    for column, value, size in follows:
         stated = row.number(column) if row.get(column) else None
-        if stated is not None and abs(stated - value) > CONTRADICTS * sizes[column]:
+        if stated is not None and abs(stated - value) > CONTRADICTS * size:
             rule = "start, on-time and channel rule"
             row.warn(column, f"{column} {row[column]} is ignored, {value:.6g} follows: {rule}")
 
