@@ -266,8 +266,8 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         angle = int(whole) + int(minutes) / 60.0 + float(seconds.strip(".") or 0.0) / 3600.0
         raise ValueError(
             f"{shown(text)} has minutes; write decimal degrees: "
-            f"{sign}{angle * (15.0 if mark == 'h' else 1.0):.8g} deg "
-            "(a declination is from -90 deg to 90 deg)"
+            f"{sign}{angle * (15.0 if mark == 'h' else 1.0):.8g} deg (a declination is from -90 "
+            "deg to 90 deg)"
         )
     match = _QUANTITY.fullmatch(text)
     # A "unit" that starts like the rest of a number has a thousands separator before it.
@@ -446,8 +446,12 @@ def shifts(value: Any) -> tuple[float, ...]:
     """Angles in rad, infinite where any will do; raises BadRequest."""
     angles = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     fits = [(is_number(angle) or angle == math.inf) and angle >= 0.0 for angle in angles]
-    expected = "angles of at least 0, in rad, such as (0.0, math.inf)"
-    expect(all(fits) and fits != [], "allow", value, expected)
+    expect(
+        all(fits) and fits != [],
+        "allow",
+        value,
+        "angles of at least 0, in rad, such as (0.0, math.inf)",
+    )
     return tuple(map(float, angles))
 
 

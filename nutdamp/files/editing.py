@@ -205,8 +205,9 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
         raise _NoPlaceError(
             f"expected a position, such as {dotted((*behind, 0))}: the entries have no names"
         )
-    cure = cure_of(step, texts)
-    raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
+    raise _NoPlaceError(
+        f"no entry of {dotted(behind)} has the name {shown(step)}; {cure_of(step, texts)}"
+    )
 
 
 def _of_python(value: object, place: Place, path: KeyPath = ()) -> Node:
@@ -234,8 +235,10 @@ def _of_python(value: object, place: Place, path: KeyPath = ()) -> Node:
         entries = [_of_python(child, place, (*path, row)) for row, child in enumerate(value)]
         return Node(entries, place)
     where = ": ".join(filter(None, (str(place), dotted(path))))
-    expected = "a number, a text, a date, a list or a mapping"
-    raise BadRequest(f"{where}: expected {expected}, got {type(value).__name__}")
+    raise BadRequest(
+        f"{where}: expected a number, a text, a date, a list or a mapping, got "
+        f"{type(value).__name__}"
+    )
 
 
 def aimed(

@@ -48,13 +48,13 @@ def basilisk_script(plan: Plan) -> str:
         )
     if spacecraft.inertia.wheel != 0.0:
         raise BadRequest(
-            "a Basilisk script flies one rigid body: it has no wheel, "
-            "and the spacecraft file has one"
+            "a Basilisk script flies one rigid body: it has no wheel, and the spacecraft file has "
+            "one"
         )
     if shed(spacecraft) is not None:
         problem = (
-            "a Basilisk script flies constant moments of inertia: "
-            "leave tank.inertia_per_kg out of the spacecraft"
+            "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out "
+            "of the spacecraft"
         )
         raise BadRequest(
             f"{problem} file, and plan without it, if the moments may count as constant"
@@ -62,8 +62,14 @@ def basilisk_script(plan: Plan) -> str:
     rates, quaternion = spacecraft.inertia.in_file_axes(
         spacecraft.initial.rates, spacecraft.initial.quaternion
     )
-    about = f"{plan.scheme} schedule for {spacecraft.name}, status {plan.verdict.status.value}"
-    title = " ".join(about.split()).replace("\\", "/").replace('"', "'")
+    title = (
+        " ".join(
+            f"{plan.scheme} schedule for {spacecraft.name}, "
+            f"status {plan.verdict.status.value}".split()
+        )
+        .replace("\\", "/")
+        .replace('"', "'")
+    )
     return SCRIPT.read_text(encoding="utf-8").format(
         title=title,
         version=__version__,
@@ -162,14 +168,16 @@ def reference(spacecraft: Spacecraft) -> Reference:
         names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
         lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
         place = "add" if start is None else "add there"
-        cure = f"{place}\nattitude:\n{lines}"
         raise BadRequest(
-            f"this format needs {names}, which the spacecraft file does not give; {cure}"
+            f"this format needs {names}, which the spacecraft file does not give; "
+            f"{place}\nattitude:\n{lines}"
         )
     frame = "EME2000" if start.frame in PRECESSED else start.frame
     if frame not in AXES:
-        problem = f"{frame!r} is no frame that the format knows; expected one of {', '.join(AXES)}"
-        raise Unsuitable(("attitude", "frame"), problem)
+        raise Unsuitable(
+            ("attitude", "frame"),
+            f"{frame!r} is no frame that the format knows; expected one of {', '.join(AXES)}",
+        )
     return Reference(Epoch.parse(start.epoch), frame)
 
 
@@ -188,8 +196,10 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
         turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
         counts.append(max(math.ceil(turn / TURN) + 1, LEAST_RECORDS))
     if (total := sum(counts)) > MOST_RECORDS:
-        cure = "choose an earlier end (until)"
-        raise BadRequest(f"the track would have {total} records, more than {MOST_RECORDS}; {cure}")
+        raise BadRequest(
+            f"the track would have {total} records, more than {MOST_RECORDS}; choose an earlier "
+            "end (until)"
+        )
     previous: Vector | None = None  # the quaternion of the record before
     for leg, count in zip(legs, counts, strict=True):
         begin, end = (round(time * NANOSECONDS) for time in (leg.start, min(leg.end, until)))
@@ -314,8 +324,10 @@ def samples_file(flown: Dispersion) -> Callable[[IO[bytes]], None]:
 
 def _values(core: Results) -> Array:
     if core.values is None:
-        counted = f"more than {EXACT_CASES:,} cases are counted and not kept"
-        raise BadRequest(f"{counted}: name a file for them, nutdamp.disperse(plan, csv=…)")
+        raise BadRequest(
+            f"more than {EXACT_CASES:,} cases are counted and not kept: name a file for them, "
+            "nutdamp.disperse(plan, csv=…)"
+        )
     return core.values[:, : core.done]
 
 

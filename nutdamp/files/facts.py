@@ -170,8 +170,10 @@ def tensor_fault(tensor: Vector) -> Finding | None:
     skew = np.abs(tensor - tensor.T)
     if skew.max() > SYMMETRIC * np.abs(tensor).max():
         column, row = map(int, np.unravel_index(np.argmax(skew), skew.shape))
-        mirrored = f"{tensor[column, row]:g} at [{column}][{row}]; both must be equal"
-        problem = f"not symmetric: {tensor[row, column]:g} here, but {mirrored}"
+        problem = (
+            f"not symmetric: {tensor[row, column]:g} here, but {tensor[column, row]:g} at "
+            f"[{column}][{row}]; both must be equal"
+        )
         return Finding((*path, row, column), problem)
     fault = moments_fault(np.asarray(np.linalg.eigvalsh(symmetric(tensor))))
     return None if fault is None else Finding(path, fault)
@@ -187,6 +189,7 @@ def moments_fault(moments: Vector) -> str | None:
         wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= limit)
         return f"{values}; all three must be above 0, not {wrong}"
     if largest > (smallest + middle) * (1.0 + SYMMETRIC):
-        rule = "the largest must not exceed the sum of the other two (triangle inequality)"
-        return f"{values}: {rule}"
+        return (
+            f"{values}: the largest must not exceed the sum of the other two (triangle inequality)"
+        )
     return None

@@ -110,19 +110,19 @@ def mismatch(node: Node, expected: str) -> ValueError:
 A_LIST, A_MAPPING = "a list [value, …]", "a mapping {key: value, …}"
 
 
-def whole(least: int, largest: int) -> ValueKind:
+def whole(minimum: int, largest: int) -> ValueKind:
     """A whole number, both ends of its range included."""
 
     def read(node: Node, _: KeyPath, _values: Values) -> int:
         if not isinstance(node.value, int) or isinstance(node.value, bool):
             raise mismatch(node, "a whole number")
-        if node.value < least:
-            raise mismatch(node, f"at least {least}")
+        if node.value < minimum:
+            raise mismatch(node, f"at least {minimum}")
         if node.value > largest:
             raise mismatch(node, f"at most {largest}")
         return node.value
 
-    schema = {"type": "integer", "minimum": least, "maximum": largest}
+    schema = {"type": "integer", "minimum": minimum, "maximum": largest}
     return ValueKind(read, schema, form="a whole number")
 
 
@@ -188,28 +188,28 @@ def row(*parts: ValueKind) -> ValueKind:
     return ValueKind(read, schema, parts)
 
 
-def rows(part: ValueKind, least: int = 0, largest: int | None = None) -> ValueKind:
-    """A list of entries of one kind, ``least`` to ``largest`` of them."""
+def rows(part: ValueKind, minimum: int = 0, largest: int | None = None) -> ValueKind:
+    """A list of entries of one kind, ``minimum`` to ``largest`` of them."""
 
     def read(node: Node, path: KeyPath, values: Values) -> list[Any]:
-        entries = enumerate(_entries(node, least, largest))
+        entries = enumerate(_entries(node, minimum, largest))
         return [values.read(part, entry, (*path, place)) for place, entry in entries]
 
-    counts = {"minItems": least, "maxItems": largest}
+    counts = {"minItems": minimum, "maxItems": largest}
     bounds = {name: count for name, count in counts.items() if count}
     return ValueKind(read, {"type": "array", "items": part.schema, **bounds}, (part,))
 
 
-def _entries(node: Node, least: int, largest: int | None) -> list[Node]:
-    """The entries of a list of ``least`` to ``largest``; raises ValueError for another value."""
+def _entries(node: Node, minimum: int, largest: int | None) -> list[Node]:
+    """The entries of a list of ``minimum`` to ``largest``; raises ValueError for another value."""
     entries = node.value
     if not isinstance(entries, list):
         raise mismatch(node, A_LIST)
-    if not entries and least == 1:
+    if not entries and minimum == 1:
         raise ValueError("empty; expected an entry")
-    if len(entries) < least or len(entries) > (largest or math.inf):
-        expected = f"{least}" if least == largest else f"{least} to {largest}"
-        expected = f"at least {least}" if largest is None else expected
+    if len(entries) < minimum or len(entries) > (largest or math.inf):
+        expected = f"{minimum}" if minimum == largest else f"{minimum} to {largest}"
+        expected = f"at least {minimum}" if largest is None else expected
         comma = ""
         for one, other in pairwise(entry.value for entry in entries):
             # a decimal comma makes two entries of one: [0,5 deg, 1 deg]
@@ -220,13 +220,13 @@ def _entries(node: Node, least: int, largest: int | None) -> list[Node]:
     return entries
 
 
-def named(part: ValueKind, least: int = 0) -> ValueKind:
-    """A mapping of names to values of one kind, ``least`` of them or more."""
+def named(part: ValueKind, minimum: int = 0) -> ValueKind:
+    """A mapping of names to values of one kind, ``minimum`` of them or more."""
 
     def read(node: Node, path: KeyPath, values: Values) -> dict[str, Any]:
         if not isinstance(node.value, dict):
             raise mismatch(node, A_MAPPING)
-        if len(node.value) < least:
+        if len(node.value) < minimum:
             raise ValueError("empty; expected an entry")
         entries = {}
         for name, entry in node.value.items():
@@ -235,7 +235,7 @@ def named(part: ValueKind, least: int = 0) -> ValueKind:
         return entries
 
     schema = {"type": "object", "additionalProperties": part.schema}
-    return ValueKind(read, schema | ({"minProperties": least} if least else {}), (part,))
+    return ValueKind(read, schema | ({"minProperties": minimum} if minimum else {}), (part,))
 
 
 def either(several: ValueKind, section: ValueKind) -> ValueKind:
@@ -273,8 +273,9 @@ def section(
                 contents[name] = key.default if child.value is None else value
             elif key.default is REQUIRED:
                 what = key.description.partition(". ")[0].rstrip(".")
-                problem = f"missing; {what[:1].lower()}{what[1:]}"
-                values.findings.append(Finding((*path, name), problem))
+                values.findings.append(
+                    Finding((*path, name), f"missing; {what[:1].lower()}{what[1:]}")
+                )
         return SimpleNamespace(**contents)
 
     properties = {}
@@ -363,8 +364,9 @@ def quantity(kind: str, **bounds: float) -> ValueKind:
                 hint = f" (read as radians; write {value} deg)" if angle else hint
             raise ValueError(f"{shown(value)} is out of range; {expected}{hint}")
         if result < bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
-            smallest = f"in SI at least {SMALLEST:g}"
-            raise ValueError(f"{shown(value)} is too small to be real; {expected}, {smallest}")
+            raise ValueError(
+                f"{shown(value)} is too small to be real; {expected}, in SI at least {SMALLEST:g}"
+            )
         return result
 
     number = {"type": "number", **bounds}

@@ -107,8 +107,10 @@ def size(distribution: str, quantity: str) -> ValueKind:
         value = node.plain()
         size, relative = size_of(value, quantity)
         if distribution != "bias" and size < 0.0:
-            cure = f"expected {what} of at least 0, or bias for a fixed offset"
-            raise ValueError(f"{shown(value)} is negative; {cure}")
+            raise ValueError(
+                f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed "
+                "offset"
+            )
         share = abs(size) if relative else 0.0
         if quantity == "angle":
             share = abs(size) / RIGHT_ANGLE
@@ -146,14 +148,17 @@ def tolerance_of(quantity: str) -> ValueKind:
         if not isinstance(node.value, dict):
             raise mismatch(node, "a tolerance, such as {normal: 2 %}")
         contents = sizes.read(node, path, values)
-        given = [name for name in node.value if name in keys]
-        if not given:
-            cure = f"give {{normal: {EXAMPLES.get(quantity, '2 %')}}}"
-            raise ValueError(f"names no distribution; {cure}, or uniform, triangular, bias")
-        for name in given[1:]:
-            problem = f"given together with {given[0]}; keep one of the two"
-            values.findings.append(Finding((*path, name), problem))
-        return getattr(contents, given[0])
+        stated = [name for name in node.value if name in keys]
+        if not stated:
+            raise ValueError(
+                f"names no distribution; give {{normal: {EXAMPLES.get(quantity, '2 %')}}}, or "
+                "uniform, triangular, bias"
+            )
+        for name in stated[1:]:
+            values.findings.append(
+                Finding((*path, name), f"given together with {stated[0]}; keep one of the two")
+            )
+        return getattr(contents, stated[0])
 
     schema = {
         "type": "object",
@@ -260,8 +265,9 @@ def sensor_quantity(**bounds: float) -> ValueKind:
     def read(node: Node, _: KeyPath, _values: Values) -> float:
         result, _relative = size_of(node.plain(), READING)
         if result < bounds.get("minimum", -math.inf):
-            expected = f"expected at least {bounds['minimum']:g}"
-            raise ValueError(f"{shown(node.plain())} is out of range; {expected}")
+            raise ValueError(
+                f"{shown(node.plain())} is out of range; expected at least {bounds['minimum']:g}"
+            )
         return result
 
     texts = map(unit_text, unit_kinds(READING))
@@ -327,8 +333,9 @@ def date_and_time() -> ValueKind:
     def read(node: Node, path: KeyPath, values: Values) -> str:
         moment: str = plain.read(node, path, values)
         if not re.fullmatch(_EPOCH, moment):
-            cure = "expected ISO 8601: 2026-03-01T12:00:00Z"
-            raise ValueError(f"{shown(moment)} is no epoch; {cure}")
+            raise ValueError(
+                f"{shown(moment)} is no epoch; expected ISO 8601: 2026-03-01T12:00:00Z"
+            )
         from nutdamp.common.time import Epoch  # an epoch
 
         # raises for a day that is none, and for one without UTC or beyond four digits
@@ -399,9 +406,9 @@ LOOP_SENSOR = section(
         ),
         "axes": optional(
             choice("file", "principal"),
-            "Axes about which gyros measure. file (default): those of the file, where a "
-            "tilted principal axis shows as a rate. principal: those of gyros calibrated to "
-            "the principal axes.",
+            "Axes about which gyros measure. file (default): those of the file, where a tilted "
+            "principal axis shows as a rate. principal: those of gyros calibrated to the "
+            "principal axes.",
             "principal",
             default="file",
         ),
@@ -475,9 +482,9 @@ LOOP = section(
         ),
         "law": optional(
             choice("four-pulse", "one-pulse", "bang"),
-            "four-pulse (default): each channel that comes into line fires as long as "
-            "needed, at most on_time. one-pulse: the same, at most half a nutation period. "
-            "bang: each fires for on_time.",
+            "four-pulse (default): each channel that comes into line fires as long as needed, at "
+            "most on_time. one-pulse: the same, at most half a nutation period. bang: each fires "
+            "for on_time.",
             "four-pulse",
             default="four-pulse",
         ),
@@ -500,8 +507,8 @@ LOOP = section(
         ),
         "predict": optional(
             flag(),
-            "true (default): firings are centred on their moments, with delay, filter and "
-            "half the on-time compensated.",
+            "true (default): firings are centred on their moments, with delay, filter and half "
+            "the on-time compensated.",
             True,
             default=True,
         ),
@@ -513,8 +520,8 @@ LOOP = section(
         ),
         "on_time": optional(
             POSITIVE_TIME,
-            "On-time of bang, and longest on-time of four-pulse, s. Default of four-pulse: "
-            "an eighth of the nutation period, within min_on_time and max_on_time.",
+            "On-time of bang, and longest on-time of four-pulse, s. Default of four-pulse: an "
+            "eighth of the nutation period, within min_on_time and max_on_time.",
             "50 ms",
         ),
         "faults": optional(LOOP_FAULTS, "Faults to fly with, default none.", {"reversed": ["+M1"]}),
@@ -524,8 +531,8 @@ LOOP = section(
 
 ORBIT = section(
     "OrbitSection",
-    "Position and velocity at attitude.epoch, in attitude.frame. They are for messages to "
-    "flight dynamics.",
+    "Position and velocity at attitude.epoch, in attitude.frame. They are for messages to flight "
+    "dynamics.",
     {
         "position": required(POSITION, "Position from the center, m.", ["7000 km", 0, 0]),
         "velocity": required(rows(quantity("speed"), 3, 3), "Velocity, m/s.", [0, "7.5 km/s", 0]),
@@ -540,8 +547,8 @@ WHEEL = section(
     {
         "momentum": required(
             quantity("momentum"),
-            "Its constant angular momentum along principal axis 3, signed, N m s. It adds "
-            "to the C ω3 of the rest.",
+            "Its constant angular momentum along principal axis 3, signed, N m s. It adds to the "
+            "C ω3 of the rest.",
             "40 N m s",
         ),
     },
@@ -559,15 +566,15 @@ SUN_SENSOR = section(
         ),
         "elevation": optional(
             DECLINATION,
-            "Middle of its view, rad, from the plane square to axis 3 towards the spin "
-            "axis; default 0.",
+            "Middle of its view, rad, from the plane square to axis 3 towards the spin axis; "
+            "default 0.",
             "45 deg",
             default=0.0,
         ),
         "half_width": optional(
             APART,
-            "Largest angle from there at which it sees the Sun, rad. Default: 90 deg, which "
-            "is always.",
+            "Largest angle from there at which it sees the Sun, rad. Default: 90 deg, which is "
+            "always.",
             "45 deg",
             default=RIGHT_ANGLE,
         ),
@@ -616,16 +623,15 @@ COMMANDS = section(
         ),
         "per_turn": optional(
             whole(1, 2),
-            "Number of blocks that may fire in the same turns, without overlap; default 1. "
-            "With 2, prefer delay_is: angle, which keeps opposite pulses apart while the "
-            "spin changes.",
+            "Number of blocks that may fire in the same turns, without overlap; default 1. With "
+            "2, prefer delay_is: angle, which keeps opposite pulses apart while the spin changes.",
             2,
             default=1,
         ),
         "delay_is": optional(
             choice("time", "angle"),
-            "How a delay counts. time (default): seconds after the Sun pulse. angle: turn "
-            "of the Sun since its pulse.",
+            "How a delay counts. time (default): seconds after the Sun pulse. angle: turn of the "
+            "Sun since its pulse.",
             "angle",
             default="time",
         ),
@@ -635,8 +641,8 @@ COMMANDS = section(
 
 KEEP = section(
     "KeepSection",
-    "A cone about a direction in space. The spin axis must not enter it (min), or must not "
-    "leave it (max). Nutation counts.",
+    "A cone about a direction in space. The spin axis must not enter it (min), or must not leave "
+    "it (max). Nutation counts.",
     {
         "name": required(NAME, "Name of the cone, for reports.", "Earth"),
         "direction": required(
@@ -723,8 +729,8 @@ TANK = section(
         ),
         "inertia_per_kg": optional(
             either(rows(SHED, 3, 3), SHED_MOMENTS),
-            "Decrease of the moments of inertia for each kg used, kg m²/kg. Give A and C, "
-            "or the three principal moments, the one about axis 3 last. Default: they stay.",
+            "Decrease of the moments of inertia for each kg used, kg m²/kg. Give A and C, or the "
+            "three principal moments, the one about axis 3 last. Default: they stay.",
             {"A": "0.4 kg m^2/kg", "C": "0.6 kg m^2/kg"},
         ),
     },
@@ -761,9 +767,9 @@ INERTIA = section(
         ),
         "tensor": optional(
             rows(rows(quantity("inertia"), 3, 3), 3, 3),
-            "Inertia tensor, 3 rows of 3, kg m². Entries off the diagonal are minus the "
-            "products of inertia: row 1, column 2 is -IXY, with IXY the sum of m x y as in "
-            "CCSDS messages. Axis 3 is the principal axis nearest the file's third axis.",
+            "Inertia tensor, 3 rows of 3, kg m². Entries off the diagonal are minus the products "
+            "of inertia: row 1, column 2 is -IXY, with IXY the sum of m x y as in CCSDS "
+            "messages. Axis 3 is the principal axis nearest the file's third axis.",
             [[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]],
         ),
     },
@@ -804,21 +810,20 @@ ATTITUDE = section(
         ),
         "spin_axis": optional(
             IN_THE_SKY,
-            "Right ascension and declination of the spin axis, rad, in place of quaternion. "
-            "See phase.",
+            "Right ascension and declination of the spin axis, rad, in place of quaternion. See "
+            "phase.",
             ["120 deg", "-15 deg"],
         ),
         "phase": optional(
             ANGLE,
-            "Angle about spin_axis from its ascending node to body axis 1, rad; default 0. "
-            "The ascending node is z of the frame × spin axis; at a pole it is x of the "
-            "frame.",
+            "Angle about spin_axis from its ascending node to body axis 1, rad; default 0. The "
+            "ascending node is z of the frame × spin axis; at a pole it is x of the frame.",
             "20 deg",
         ),
         "sun_phase": optional(
             ANGLE,
-            "Angle about spin_axis from the side of the Sun to body axis 1, rad, in place "
-            "of phase. It needs sun.",
+            "Angle about spin_axis from the side of the Sun to body axis 1, rad, in place of "
+            "phase. It needs sun.",
             "35 deg",
         ),
         "of": optional(
@@ -834,8 +839,8 @@ ATTITUDE = section(
         ),
         "frame": optional(
             choice("EME2000", "J2000", "GCRF", "ECLIPJ2000", "ECLIPDATE", "MOD"),
-            "Inertial frame of the attitude and of all directions of the file. In a frame "
-            "of the ecliptic, right ascension and declination are longitude and latitude.",
+            "Inertial frame of the attitude and of all directions of the file. In a frame of the "
+            "ecliptic, right ascension and declination are longitude and latitude.",
             "EME2000",
         ),
     },
@@ -877,14 +882,14 @@ THRUSTER = section(
         "max_on_time": optional(POSITIVE_TIME, "Longest firing, s. Default: no limit.", "2 s"),
         "valve": optional(
             VALVE,
-            "How the thrust follows a command. Default: as the valve of the file, or full "
-            "thrust at once.",
+            "How the thrust follows a command. Default: as the valve of the file, or full thrust "
+            "at once.",
             {"open_delay": "8 ms", "close_delay": "12 ms"},
         ),
         "impulse_bit": optional(
             rows(row(POSITIVE_TIME, IMPULSE, POSITIVE_TIME), 2),
-            "Table from tests, in place of valve. Each row has on-time, s, impulse, N s, "
-            "and the time of its centroid after the start of the command, s.",
+            "Table from tests, in place of valve. Each row has on-time, s, impulse, N s, and the "
+            "time of its centroid after the start of the command, s.",
             [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
         ),
     },
@@ -919,8 +924,8 @@ REQUIREMENT = section(
         ),
         "momentum_shift": optional(
             ACUTE_ANGLE,
-            "Largest turn of H from t = 0, rad, above 0 and below 90 deg. With a target "
-            "give pointing.",
+            "Largest turn of H from t = 0, rad, above 0 and below 90 deg. With a target give "
+            "pointing.",
             "0.2 deg",
         ),
         "pointing": optional(
@@ -930,8 +935,8 @@ REQUIREMENT = section(
         ),
         "nutation_during": optional(
             ACUTE_ANGLE,
-            "Largest nutation angle on the way, rad, above 0 and below 90 deg. It is a cone "
-            "of the spin axis about H. For other cones see keep.",
+            "Largest nutation angle on the way, rad, above 0 and below 90 deg. It is a cone of "
+            "the spin axis about H. For other cones see keep.",
             "2 deg",
         ),
         "spin": optional(
@@ -958,8 +963,8 @@ GOAL = section(
         ),
         "azimuth": optional(
             ANGLE,
-            "Azimuth of the target axis about H, rad, from the initial tilt direction of "
-            "the spin axis.",
+            "Azimuth of the target axis about H, rad, from the initial tilt direction of the "
+            "spin axis.",
             "45 deg",
         ),
         "right_ascension": optional(
@@ -972,8 +977,8 @@ GOAL = section(
         ),
         "sun_angle": optional(
             APART,
-            "Angle of the target axis from the Sun, rad, 0 to 180 deg. The target is the "
-            "nearest such axis on the great circle through the Sun and H at t = 0.",
+            "Angle of the target axis from the Sun, rad, 0 to 180 deg. The target is the nearest "
+            "such axis on the great circle through the Sun and H at t = 0.",
             "109 deg",
         ),
         "spin": optional(RATE, "Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm"),
@@ -1011,27 +1016,27 @@ DISTURBANCE = section(
         "name": optional(NAME, "Name of the disturbance, for reports.", "leak"),
         "kind": optional(
             choice("constant", "rotating", "axial"),
-            "constant: fixed in the body. rotating: turns about principal axis 3. axial: "
-            "along the third axis of the file. Default: rotating if rate or fixed_in is "
-            "given, else constant.",
+            "constant: fixed in the body. rotating: turns about principal axis 3. axial: along "
+            "the third axis of the file. Default: rotating if rate or fixed_in is given, else "
+            "constant.",
             "rotating",
         ),
         "torque": required(
             or_alone(TORQUES, quantity("torque")),
-            "Torque [M1, M2, M3] about the centre of mass, N m. A rotating one: its value "
-            "at t = 0, with M3 = 0. An axial one: a single number.",
+            "Torque [M1, M2, M3] about the centre of mass, N m. A rotating one: its value at t = "
+            "0, with M3 = 0. An axial one: a single number.",
             ["20 mN m", 0, 0],
         ),
         "rate": optional(
             RATE,
-            "Rate at which a rotating torque turns about axis 3, as seen in the body, "
-            "signed, rad/s.",
+            "Rate at which a rotating torque turns about axis 3, as seen in the body, signed, "
+            "rad/s.",
             "-3 rad/s",
         ),
         "fixed_in": optional(
             choice("inertial"),
-            "inertial: a rotating torque that is nearly fixed in space. Its rate is minus "
-            "the spin.",
+            "inertial: a rotating torque that is nearly fixed in space. Its rate is minus the "
+            "spin.",
             "inertial",
         ),
         "from": optional(TIME, "Time after t = 0 at which it begins, s; default 0.", "10 s"),
@@ -1063,8 +1068,8 @@ DISSIPATION = section(
 
 SPACECRAFT = section(
     "SpacecraftFile",
-    "A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare "
-    "numbers are SI.",
+    "A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers "
+    "are SI.",
     {
         "name": required(NAME, "Name of the spacecraft.", "Sounder-1"),
         "mass": optional(MASS, "Mass, kg. Without it no velocity change is computed.", "250 kg"),
@@ -1075,8 +1080,8 @@ SPACECRAFT = section(
         ),
         "center_of_mass": optional(
             POSITION,
-            "Center of mass, m, in the frame of the positions of thrusters and sensor. "
-            "Default: positions count from it.",
+            "Center of mass, m, in the frame of the positions of thrusters and sensor. Default: "
+            "positions count from it.",
             [0, "2 mm", "0.4 m"],
         ),
         "center_of_mass_per_kg": optional(
@@ -1120,8 +1125,8 @@ SPACECRAFT = section(
         ),
         "channels": optional(
             named(rows(NAME, 1), 1),
-            "Names of thrusters that fire together. Without it each thruster is a channel "
-            "of its own.",
+            "Names of thrusters that fire together. Without it each thruster is a channel of its "
+            "own.",
             {"+M1": ["T1", "T2"]},
         ),
         "steerable": optional(

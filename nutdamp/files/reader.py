@@ -170,8 +170,11 @@ def read_spacecraft(
     if contents.attitude is not None and contents.attitude.sun_phase is not None:
         axis = attitude.on_sphere(*(contents.attitude.spin_axis or ()))
         if sunward is None or np.linalg.norm(np.cross(axis, sunward)) < ALONG:
-            problem = "the Sun lies along spin_axis, which has no side of the Sun then; give phase"
-            finding = Finding(("attitude", "sun_phase"), problem, True)
+            finding = Finding(
+                ("attitude", "sun_phase"),
+                "the Sun lies along spin_axis, which has no side of the Sun then; give phase",
+                True,
+            )
             raise FaultyFile([_placed(finding, facts.root, name)])
     cold, tank = _feed(contents)
     torquer = steerable if thrusters else steerable or Steerable()

@@ -203,25 +203,25 @@ def _broken(facts: Facts, path: KeyPath, kind: str, names: str, cure: str) -> It
         return alone.replace("|.", " or ").replace("=", ": ")
 
     others = names.split()
-    there = facts.has(*path)
+    exists = facts.has(*path)
     present = [other for other in others if holds(other)]
     number, text = facts.number(*path), facts.text(*path)
     match kind:
-        case "beside" if there and present:
+        case "beside" if exists and present:
             yield Finding(path, f"given together with {words(present)}; {cure}", True)
-        case "needs" if there:
+        case "needs" if exists:
             lacking = [other for other in others if not any(map(holds, other.split("|")))]
             if lacking:
                 yield Finding(path, f"needs {words(lacking)}{cure}", True)
-        case "missing" if not there and not present:
-            # one that must be there unless one of the others is
+        case "missing" if not exists and not present:
+            # a key that must be there unless one of the others is
             if isinstance(facts.value(*path[:-1]), dict):
                 yield Finding(path, f"missing; {cure}")
-        case "completes" if present and not there:
+        case "completes" if present and not exists:
             yield Finding(path, f"missing; {words(present)} alone {cure}")
-        case "fed" if not there and not present and facts.has("tank"):
+        case "fed" if not exists and not present and facts.has("tank"):
             yield Finding(path, f"missing; {cure}")
-        case "wrong" if there:
+        case "wrong" if exists:
             yield Finding(path, cure, text is None)
         case "at most" | "below" if number is not None:
             limit = facts.number(*place(names))
@@ -229,8 +229,11 @@ def _broken(facts: Facts, path: KeyPath, kind: str, names: str, cure: str) -> It
             if limit is not None and number >= limit and not equal:
                 fault = "exceeds" if kind == "at most" else "is not below"
                 expected = "at most" if kind == "at most" else "less than"
-                problem = f"{amount(cure, number)} {fault} {dotted(place(names))}"
-                yield Finding(path, f"{problem}; expected {expected} {amount(cure, limit)}")
+                yield Finding(
+                    path,
+                    f"{amount(cure, number)} {fault} {dotted(place(names))}; expected {expected} "
+                    f"{amount(cure, limit)}",
+                )
         case "not zero":
             numbers = facts.vector(*path) if number is None else number
             if numbers is not None and np.max(np.abs(numbers), initial=0.0) < SMALLEST:
@@ -240,16 +243,20 @@ def _broken(facts: Facts, path: KeyPath, kind: str, names: str, cure: str) -> It
                 values = [facts.number(*row, column) for row in facts.below(*path)]
                 for row, (before, value) in enumerate(pairwise(values), start=1):
                     if before is not None and value is not None and value <= before:
-                        problem = f"{amount(quantity, value)} is not above that of the row before"
-                        cured = f"{problem}, {amount(quantity, before)}; {cure}"
+                        cured = (
+                            f"{amount(quantity, value)} is not above that of the row before, "
+                            f"{amount(quantity, before)}; {cure}"
+                        )
                         yield Finding((*path, row, column), cured)
         case "once":  # a list of which no two entries have the same text, or the same at a key
             first: dict[str, KeyPath] = {}
             for entry in facts.below(*path):
                 name = facts.text(*entry, *others)
                 if name in first:
-                    problem = f"{shown(name)} is given twice, first in {dotted(first[name])}"
-                    yield Finding((*entry, *others), f"{problem}; {cure}")
+                    yield Finding(
+                        (*entry, *others),
+                        f"{shown(name)} is given twice, first in {dotted(first[name])}; {cure}",
+                    )
                 elif name is not None:
                     first[name] = entry
         case "named" if text is not None and text not in facts.names[names]:
@@ -285,8 +292,11 @@ def findings(facts: Facts, *, aimed: bool) -> Iterator[Finding]:
 def _inertia(facts: Facts) -> Iterator[Finding]:
     A, C = facts.number("inertia", "A"), facts.number("inertia", "C")
     if A is not None and C is not None and C > 2 * A > 0:
-        cure = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
-        yield Finding(("inertia", "C"), f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {cure}")
+        yield Finding(
+            ("inertia", "C"),
+            f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: not physically possible (A and C "
+            "swapped?); at most 2 A (a flat disc)",
+        )
     if facts.tensor is None:
         return
     path: KeyPath = ("inertia", "tensor")
@@ -299,9 +309,11 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
     if wheel != 0.0:
         if spin is not None and not rigid_body.growth(moments, spin, wheel).stable:
             low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
-            problem = "nutation about the spin axis grows with it"
-            cure = f"expected a momentum below {low:.4g} or above {high:.4g} N m s"
-            yield Finding(("wheel", "momentum"), f"{problem}; {cure}")
+            yield Finding(
+                ("wheel", "momentum"),
+                f"nutation about the spin axis grows with it; expected a momentum below {low:.4g} "
+                f"or above {high:.4g} N m s",
+            )
         return
     unstable = {
         "degenerate": "the same principal moment as just one other axis",
@@ -311,34 +323,49 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
     if kind in unstable:
         named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
         values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
-        problem = f"the spin axis has {unstable[kind]} ({values} kg m^2)"
-        cure = "spin about the axis of the smallest or largest moment, or hold it by a wheel"
-        yield Finding(path, f"{problem}: free spin about it is unstable; {cure}")
+        yield Finding(
+            path,
+            f"the spin axis has {unstable[kind]} ({values} kg m^2): free spin about it is "
+            "unstable; spin about the axis of the smallest or largest moment, or hold it by a "
+            "wheel",
+        )
 
 
 def _motion(facts: Facts) -> Iterator[Finding]:
     path, stated = facts.stated_spin
     if stated is not None and abs(stated) < SMALLEST and not facts.wheel:
-        cure = "expected a rate about axis 3, or a wheel; without both there is no nutation"
-        yield Finding(path, f"the spin is zero; {cure}")
+        yield Finding(
+            path,
+            "the spin is zero; expected a rate about axis 3, or a wheel; without both there is "
+            "no nutation",
+        )
     spin, inertia = facts.spin, facts.inertia
     final = facts.number("goal", "spin")
     if final is not None and spin is not None and final * spin < 0.0:
-        problem = "its sign differs from the spin at t = 0; the spin cannot be reversed"
-        yield Finding(("goal", "spin"), problem)
+        yield Finding(
+            ("goal", "spin"), "its sign differs from the spin at t = 0; the spin cannot be reversed"
+        )
     if spin is None or inertia is None or not inertia.wheel:
         return
     axial = inertia.axial(spin)
     path = ("wheel", "momentum")
     if abs(axial) <= CANCELLED * abs(inertia.wheel):
-        problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s"
-        yield Finding(path, f"{problem}: without momentum there is no nutation")
+        yield Finding(
+            path,
+            f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s: without momentum there "
+            "is no nutation",
+        )
     elif axial * spin < 0.0 and facts.has("sun_sensor"):
-        problem = "points the angular momentum against the spin: blocks fired from the Sun pulse"
-        yield Finding(path, f"{problem} are not planned then; leave out sun_sensor")
+        yield Finding(
+            path,
+            "points the angular momentum against the spin: blocks fired from the Sun pulse are "
+            "not planned then; leave out sun_sensor",
+        )
     if facts.has("dissipation") and not facts.has("dissipation", "nutation"):
-        problem = "missing; with a wheel it depends on where energy is lost: give grows or decays"
-        yield Finding(("dissipation", "nutation"), problem)
+        yield Finding(
+            ("dissipation", "nutation"),
+            "missing; with a wheel it depends on where energy is lost: give grows or decays",
+        )
 
 
 def _torques(facts: Facts) -> Iterator[Finding]:
@@ -346,8 +373,11 @@ def _torques(facts: Facts) -> Iterator[Finding]:
     for path in facts.matching("disturbances.*.torque"):
         across = facts.value(*path[:-1], "kind") in (None, "constant", "rotating")
         if across and not isinstance(facts.value(*path), list) and path in facts.by_path:
-            problem = "expected three components, [M1, M2, M3], got a single torque"
-            yield Finding(path, f"{problem}; or kind: axial, along the third axis of the file")
+            yield Finding(
+                path,
+                "expected three components, [M1, M2, M3], got a single torque; or kind: axial, "
+                "along the third axis of the file",
+            )
     center = facts.vector("center_of_mass")
     for path in facts.below("thrusters"):
         position, direction = facts.vector(*path, "position"), facts.vector(*path, "direction")
@@ -359,8 +389,10 @@ def _torques(facts: Facts) -> Iterator[Finding]:
         arm = position if center is None else position - center
         torque = np.cross(arm, force_vector(direction, force))
         if math.hypot(*torque) <= CANCELLED * math.hypot(*position) * force:
-            cure = "the force passes through the centre of mass; move or turn the thruster"
-            yield Finding((*path, "position"), f"no torque: {cure}")
+            yield Finding(
+                (*path, "position"),
+                "no torque: the force passes through the centre of mass; move or turn the thruster",
+            )
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
@@ -374,8 +406,11 @@ def _channels(facts: Facts) -> Iterator[Finding]:
             if member is not None
         ]
         if any(valve != valves[0] for valve in valves):
-            problem = "its thrusters do not have the same valve or impulse_bit"
-            yield Finding(path, f"{problem}; write them alike, or use channels of their own")
+            yield Finding(
+                path,
+                "its thrusters do not have the same valve or impulse_bit; write them alike, or "
+                "use channels of their own",
+            )
 
 
 def _tank(facts: Facts) -> Iterator[Finding]:
@@ -403,15 +438,20 @@ def _dispersions(facts: Facts) -> Iterator[Finding]:
             places = {str(entry[-1]): entry for entry in facts.below(*path)}
         for name, place in places.items():
             if name not in facts.thrusts:
-                cure = cure_of(name, facts.thrusts)
-                yield Finding(place, f"no thruster is called {shown(name)}; {cure}", True)
+                yield Finding(
+                    place,
+                    f"no thruster is called {shown(name)}; {cure_of(name, facts.thrusts)}",
+                    True,
+                )
             elif key == "thrust" and facts.thrusts[name] is None:
                 for size in facts.below(*place):
                     tolerance = facts.by_path.get(size)
                     if isinstance(tolerance, Tolerance) and not tolerance.relative:
-                        problem = f"needs the thrust of {shown(name)}, which is not known"
-                        cure = "give its lever_arm, or a tolerance in %"
-                        yield Finding(size, f"{problem}; {cure}")
+                        yield Finding(
+                            size,
+                            f"needs the thrust of {shown(name)}, which is not known; give its "
+                            "lever_arm, or a tolerance in %",
+                        )
 
 
 OTHER_SENSOR = {
@@ -446,22 +486,27 @@ def _loop(facts: Facts) -> Iterator[Finding]:
         low = max(shortest, default=0.0)
         high = min((time for time in longest if time is not None), default=math.inf)
         if on_time is not None and not low <= on_time <= high:
-            problem = f"{on_time:g} s is outside what {name} allows: {span(low, high, 's')}"
-            yield Finding(("loop", "on_time"), problem)
+            yield Finding(
+                ("loop", "on_time"),
+                f"{on_time:g} s is outside what {name} allows: {span(low, high, 's')}",
+            )
     inertia, spin = facts.inertia, facts.spin
     if inertia is None or spin is None:
         return
     rate = facts.number(*sensor, "rate")
     lowest = SAMPLES * abs(inertia.nutation_rate(spin)) / (2.0 * math.pi)
     if rate is not None and 0.0 < rate < lowest and facts.value("loop", "alias") is not True:
-        problem = f"{rate:g} Hz is below four times the nutation frequency"
-        cure = f"expected at least {lowest:.4g} Hz, or alias: true beside start"
-        yield Finding((*sensor, "rate"), f"{problem}; {cure}")
+        yield Finding(
+            (*sensor, "rate"),
+            f"{rate:g} Hz is below four times the nutation frequency; expected at least "
+            f"{lowest:.4g} Hz, or alias: true beside start",
+        )
     if sensor_kind != "accelerometer":
         return
     if inertia.wheel != 0.0:
-        problem = "accelerometer: with a wheel only gyros are modelled; expected gyro"
-        yield Finding((*sensor, "kind"), problem)
+        yield Finding(
+            (*sensor, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro"
+        )
         return
     position = facts.vector(*sensor, "position")
     axis = facts.vector(*sensor, "axis")
@@ -473,8 +518,10 @@ def _loop(facts: Facts) -> Iterator[Finding]:
 
     turn = inertia.axes.T
     if is_blind(inertia.moments, turn @ position, turn @ axis / math.hypot(*axis)):
-        problem = "blind: here it shows nothing of the nutation"
-        yield Finding((*sensor, "position"), f"{problem}; move it off axis 3, or turn its axis")
+        yield Finding(
+            (*sensor, "position"),
+            "blind: here it shows nothing of the nutation; move it off axis 3, or turn its axis",
+        )
 
 
 def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
@@ -494,25 +541,37 @@ def correlation_findings(spacecraft: Spacecraft) -> Iterator[Finding]:
     for row, (first, second, _) in enumerate(pairs):
         for place, name in enumerate((first, second)):
             if name not in correlated:
-                problem = f"the dispersions have no input called {shown(name)}"
-                cure = cure_of(name, correlated)
-                faults.append(Finding((*path, row, place), f"{problem}; {cure}"))
+                faults.append(
+                    Finding(
+                        (*path, row, place),
+                        f"the dispersions have no input called {shown(name)}; "
+                        f"{cure_of(name, correlated)}",
+                    )
+                )
             elif name in fixed:
-                problem = f"{shown(name)} is a fixed offset (bias) and does not vary"
-                faults.append(Finding((*path, row, place), problem))
+                faults.append(
+                    Finding(
+                        (*path, row, place),
+                        f"{shown(name)} is a fixed offset (bias) and does not vary",
+                    )
+                )
         if first == second:
-            problem = f"{shown(first)} again; expected two different inputs"
-            faults.append(Finding((*path, row, 1), problem))
+            faults.append(
+                Finding((*path, row, 1), f"{shown(first)} again; expected two different inputs")
+            )
         elif frozenset((first, second)) in before:
-            problem = f"{first} and {second} are given before; keep one of the two"
-            faults.append(Finding((*path, row), problem))
+            faults.append(
+                Finding((*path, row), f"{first} and {second} are given before; keep one of the two")
+            )
         before.add(frozenset((first, second)))
     yield from faults
     for group in () if faults else grouped(pairs):
         if not positive_definite(group):
-            problem = f"not positive definite for {', '.join(group.names)}"
-            why = "these correlations contradict each other; pairs that are not given count as 0"
-            yield Finding(path, f"{problem}: {why}")
+            yield Finding(
+                path,
+                f"not positive definite for {', '.join(group.names)}: these correlations "
+                "contradict each other; pairs that are not given count as 0",
+            )
 
 
 # --- numbers that probably lack a unit

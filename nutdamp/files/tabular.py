@@ -248,7 +248,7 @@ class Table:
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
         """Table with ``columns`` that are known; ``what`` is the word for a row, for messages."""
         self.name = str(path)
-        self.known = columns
+        self.columns = columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}
         text = decode(read_limited(self.name, MOST_BYTES), self.name)
@@ -280,7 +280,7 @@ class Table:
             self.fault(1, column, "the column is given twice")
         self.check()
         for column in self.header:
-            if column not in self.known:
+            if column not in self.columns:
                 self.warnings[column] = [(1, f"the column {shown(column)} is not known: ignored")]
         for line, cells in self._lines:
             if len(cells) == len(self.header):
@@ -307,7 +307,7 @@ class Table:
 
     def misspelt(self, column: str) -> str:
         """The column of the header that may be meant to be a missing one, in words."""
-        close = nearest(column, [entry for entry in self.header if entry not in self.known])
+        close = nearest(column, [entry for entry in self.header if entry not in self.columns])
         return "" if close is None else f"; rename {shown(close)} if that is meant"
 
     def fault(self, line: int, where: str, problem: str) -> None:

@@ -30,15 +30,15 @@ KeyPath = tuple[str | int, ...]
 STDIN = "-"  # file name that means standard input
 
 
-def read_bytes(path: str, most: int = -1) -> bytes:
-    """Contents of a file, at most ``most`` bytes of it; ``-`` is standard input.
+def read_bytes(path: str, limit: int = -1) -> bytes:
+    """Contents of a file, at most ``limit`` bytes of it; ``-`` is standard input.
     Raises CannotRead.
     """
     try:
         if path == STDIN:
             if sys.stdin is None:
                 raise CannotRead(path, "there is no standard input")
-            return sys.stdin.buffer.read(most)
+            return sys.stdin.buffer.read(limit)
         mode = Path(path).stat().st_mode
         problem = "it is a device; expected a file, a pipe or -"
         if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
@@ -46,7 +46,7 @@ def read_bytes(path: str, most: int = -1) -> bytes:
         with Path(path).open("rb") as stream:
             if stat.S_ISCHR(mode) and not stream.isatty():  # reading may never end
                 raise CannotRead(path, problem)
-            return stream.read(most)
+            return stream.read(limit)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise CannotRead(path, reason.lower()) from error
@@ -55,13 +55,13 @@ def read_bytes(path: str, most: int = -1) -> bytes:
 MAX_BYTES = 1 << 20  # of a spacecraft file
 
 
-def read_limited(path: str, most: int = MAX_BYTES) -> bytes:
-    """Contents of a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is
+def read_limited(path: str, limit: int = MAX_BYTES) -> bytes:
+    """Contents of a file of at most ``limit`` bytes; raises CannotRead, or FaultyFile where it is
     larger.
     """
-    data = read_bytes(path, most + 1)
-    if len(data) > most:
-        raise FaultyFile([Fault(path, 0, 0, "", f"too large: more than {most >> 20} MiB")])
+    data = read_bytes(path, limit + 1)
+    if len(data) > limit:
+        raise FaultyFile([Fault(path, 0, 0, "", f"too large: more than {limit >> 20} MiB")])
     return data
 
 
@@ -196,8 +196,9 @@ def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
         "a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft"
     )
     if not isinstance(root.value, dict):
-        problem = f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
-        raise builder.fatal(root.place, problem)
+        raise builder.fatal(
+            root.place, f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
+        )
     return root, builder.faults
 
 
@@ -357,8 +358,13 @@ class _Builder:
                 self.anchors[key.anchor] = Node(text, place)
             value = self.node(self.next(), (*path, text))
             if text in values:
-                problem = f"duplicate key; already given at {keys[text]}; remove one of them"
-                self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
+                self.faults.append(
+                    place.fault(
+                        self.name,
+                        dotted((*path, text)),
+                        f"duplicate key; already given at {keys[text]}; remove one of them",
+                    )
+                )
             else:
                 values[text], keys[text] = value, place
         node = self.collection(values, [*values.values()], event, key)
