@@ -6,7 +6,8 @@ Unreadable values are skipped, so that rules work beside any other fault.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -29,11 +30,88 @@ SYMMETRIC = 1e-9
 
 
 class Facts(Values):
-    """The values of a spacecraft file by path, and what follows from them."""
+    """The values of a spacecraft file by path, and what follows from them: ``principal`` moments,
+    kg m², and axes, the ``inertia`` of a body that can spin so, and the ``spin`` about principal
+    axis 3, rad/s; each None where it is not known, or impossible.
+    """
+
+    principal: tuple[rigid_body.Moments, Vector] | None = None
+    inertia: Inertia | None = None
+    spin: float | None = None
 
     def __init__(self, root: Node) -> None:
         super().__init__(root)
         self.contents = self.read(SPACECRAFT, root)
+        self.findings += self._body()
+
+    def _body(self) -> Iterator[Finding]:
+        """Findings where no body has these moments and this spin."""
+        path: KeyPath = ("inertia", "tensor")
+        A, C = self.number("inertia", "A"), self.number("inertia", "C")
+        rows = [self.vector(*row) for row in self.below(*path)]
+        wheel = self.number("wheel", "momentum") or 0.0
+        spin_path: KeyPath = ("state", "spin")
+        spin, omega0 = self.number(*spin_path), self.vector("omega0")
+        if self.has("omega0"):
+            spin_path = ("omega0", 2)
+            spin = None if omega0 is None else float(omega0[2])
+        fault = None
+        if len(rows) == 3 and all(row is not None for row in rows):
+            fault = tensor_fault(np.array(rows))
+            if fault is None:
+                self.principal = rigid_body.principal_axes(symmetric(np.array(rows)))
+            if omega0 is not None:
+                spin_path = ("omega0",)
+                spin = None
+                if self.principal is not None:  # a rate that is rounding is zero
+                    along = float(self.principal[1][:, 2] @ omega0)
+                    spin = along if abs(along) > CANCELLED * math.hypot(*omega0) else 0.0
+        elif A is not None and C is not None and C <= 2 * A:
+            self.principal = ((A, A, C), np.eye(3))
+        elif A is not None and C is not None:
+            fault = Finding(
+                ("inertia", "C"),
+                f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: not physically possible (A and C "
+                "swapped?); at most 2 A (a flat disc)",
+            )
+        if fault is not None:
+            yield fault
+        if spin is not None and abs(spin) < SMALLEST and not wheel:
+            spin = None
+            yield Finding(
+                spin_path,
+                "the spin is zero; expected a rate about axis 3, or a wheel; without both there is "
+                "no nutation",
+            )
+        self.spin = spin
+        if self.principal is None:
+            return
+        moments = self.principal[0]
+        stable = rigid_body.growth(moments, spin or 0.0, wheel).stable
+        if rows and wheel and spin is not None and not stable:
+            low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
+            yield Finding(
+                ("wheel", "momentum"),
+                f"nutation about the spin axis grows with it; expected a momentum below {low:.4g} "
+                f"or above {high:.4g} N m s",
+            )
+        unstable = {
+            "degenerate": "the same principal moment as just one other axis",
+            "intermediate": "the middle principal moment",
+        }
+        kind = rigid_body.axis_class(moments)
+        if kind in unstable and not wheel:
+            named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
+            values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
+            yield Finding(
+                path,
+                f"the spin axis has {unstable[kind]} ({values} kg m^2): free spin about it is "
+                "unstable; spin about the axis of the smallest or largest moment, or hold it by a "
+                "wheel",
+            )
+            return
+        with suppress(ValueError):
+            self.inertia = Inertia(*self.principal, wheel)
 
     def has(self, *path: str | int) -> bool:
         """True where something is at ``path``."""
@@ -80,55 +158,6 @@ class Facts(Values):
             deeper = [self.below(*path) if step == "*" else [(*path, key)] for path in paths]
             paths = [path for group in deeper for path in group]
         return [path for path in paths if not value or self.text(*path) == value]
-
-    @cached_property
-    def tensor(self) -> Vector | None:
-        """The inertia tensor (3, 3) kg m²."""
-        rows = [self.vector(*row) for row in self.below("inertia", "tensor")]
-        return None if len(rows) != 3 or any(row is None for row in rows) else np.array(rows)
-
-    @cached_property
-    def principal(self) -> tuple[rigid_body.Moments, Vector] | None:
-        """Principal moments, kg m², and axes; None where no body has them."""
-        if self.tensor is not None:
-            sound = tensor_fault(self.tensor) is None
-            return rigid_body.principal_axes(symmetric(self.tensor)) if sound else None
-        A, C = self.number("inertia", "A"), self.number("inertia", "C")
-        return None if A is None or C is None else ((A, A, C), np.eye(3))
-
-    @cached_property
-    def inertia(self) -> Inertia | None:
-        """The inertia; None where no body has it, or it cannot spin so."""
-        if self.principal is None or moments_fault(np.array(self.principal[0])) is not None:
-            return None
-        try:
-            return Inertia(*self.principal, self.wheel)
-        except ValueError:
-            return None
-
-    @cached_property
-    def wheel(self) -> float:
-        """Momentum of the wheel, N m s; zero where there is none."""
-        return self.number("wheel", "momentum") or 0.0
-
-    @cached_property
-    def stated_spin(self) -> tuple[KeyPath, float | None]:
-        """The rate about principal axis 3, rad/s, and its path; a rate that is rounding is zero."""
-        if not self.has("omega0"):
-            return ("state", "spin"), self.number("state", "spin")
-        omega0 = self.vector("omega0")
-        if omega0 is None or (self.tensor is not None and self.principal is None):
-            return ("omega0",), None
-        if self.tensor is None or self.principal is None:
-            return ("omega0", 2), float(omega0[2])
-        spin = float(self.principal[1][:, 2] @ omega0)
-        return ("omega0",), spin if abs(spin) > CANCELLED * math.hypot(*omega0) else 0.0
-
-    @cached_property
-    def spin(self) -> float | None:
-        """The rate about principal axis 3, rad/s; None where it is zero without a wheel."""
-        spin = self.stated_spin[1]
-        return spin if spin is not None and (abs(spin) >= SMALLEST or self.wheel) else None
 
     @cached_property
     def names(self) -> dict[str, dict[str, KeyPath]]:

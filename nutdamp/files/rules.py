@@ -17,13 +17,10 @@ from nutdamp.files.facts import (
     Facts,
     force_vector,
     moments_fault,
-    symmetric,
-    tensor_fault,
 )
 from nutdamp.files.fields import SMALLEST, Finding
 from nutdamp.files.keys import BY_THRUSTER, VALVE_TIMES, by_name
 from nutdamp.files.yaml import KeyPath, dotted
-from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.spacecraft.tolerances import Tolerance
@@ -285,60 +282,12 @@ def findings(facts: Facts, *, aimed: bool) -> Iterator[Finding]:
     for pattern, kind, others, cure in RULES:
         for path in facts.matching(pattern):
             yield from _broken(facts, path, kind, others, cure)
-    for rule in (_inertia, _motion, _torques, _channels, _tank, _dispersions, _loop):
+    for rule in (_motion, _torques, _channels, _tank, _dispersions, _loop):
         yield from rule(facts)
 
 
-def _inertia(facts: Facts) -> Iterator[Finding]:
-    A, C = facts.number("inertia", "A"), facts.number("inertia", "C")
-    if A is not None and C is not None and C > 2 * A > 0:
-        yield Finding(
-            ("inertia", "C"),
-            f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: not physically possible (A and C "
-            "swapped?); at most 2 A (a flat disc)",
-        )
-    if facts.tensor is None:
-        return
-    path: KeyPath = ("inertia", "tensor")
-    fault = tensor_fault(facts.tensor)
-    if fault is not None:
-        yield fault
-        return
-    moments = rigid_body.principal_axes(symmetric(facts.tensor))[0]
-    spin, wheel = facts.spin, facts.wheel
-    if wheel != 0.0:
-        if spin is not None and not rigid_body.growth(moments, spin, wheel).stable:
-            low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
-            yield Finding(
-                ("wheel", "momentum"),
-                f"nutation about the spin axis grows with it; expected a momentum below {low:.4g} "
-                f"or above {high:.4g} N m s",
-            )
-        return
-    unstable = {
-        "degenerate": "the same principal moment as just one other axis",
-        "intermediate": "the middle principal moment",
-    }
-    kind = rigid_body.axis_class(moments)
-    if kind in unstable:
-        named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
-        values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
-        yield Finding(
-            path,
-            f"the spin axis has {unstable[kind]} ({values} kg m^2): free spin about it is "
-            "unstable; spin about the axis of the smallest or largest moment, or hold it by a "
-            "wheel",
-        )
-
-
 def _motion(facts: Facts) -> Iterator[Finding]:
-    path, stated = facts.stated_spin
-    if stated is not None and abs(stated) < SMALLEST and not facts.wheel:
-        yield Finding(
-            path,
-            "the spin is zero; expected a rate about axis 3, or a wheel; without both there is "
-            "no nutation",
-        )
+    """A spin that cannot be reached, and a wheel that turns with it."""
     spin, inertia = facts.spin, facts.inertia
     final = facts.number("goal", "spin")
     if final is not None and spin is not None and final * spin < 0.0:
@@ -348,7 +297,7 @@ def _motion(facts: Facts) -> Iterator[Finding]:
     if spin is None or inertia is None or not inertia.wheel:
         return
     axial = inertia.axial(spin)
-    path = ("wheel", "momentum")
+    path: KeyPath = ("wheel", "momentum")
     if abs(axial) <= CANCELLED * abs(inertia.wheel):
         yield Finding(
             path,
