@@ -42,23 +42,16 @@ LONGEST_STEP = 0.1  # rad; the body turns by no more in one step of the script
 def basilisk_script(plan: Plan) -> str:
     """The text of the script; raises BadRequest for dissipation, a wheel, or moments that fall."""
     spacecraft = plan.spacecraft
-    if spacecraft.dissipation is not None:
-        raise BadRequest(
-            "a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file"
-        )
-    if spacecraft.inertia.wheel != 0.0:
-        raise BadRequest(
-            "a Basilisk script flies one rigid body: it has no wheel, and the spacecraft file has "
-            "one"
-        )
-    if shed(spacecraft) is not None:
-        problem = (
-            "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out "
-            "of the spacecraft"
-        )
-        raise BadRequest(
-            f"{problem} file, and plan without it, if the moments may count as constant"
-        )
+    wheel = spacecraft.inertia.wheel
+    unfit = {
+        "a rigid body: leave dissipation out of the spacecraft file": spacecraft.dissipation,
+        "one rigid body: it has no wheel, and the spacecraft file has one": wheel,
+        "constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft file, and "
+        "plan without it, if the moments may count as constant": shed(spacecraft) is not None,
+    }
+    for words, holds in unfit.items():
+        if holds:
+            raise BadRequest(f"a Basilisk script flies {words}")
     rates, quaternion = spacecraft.inertia.in_file_axes(
         spacecraft.initial.rates, spacecraft.initial.quaternion
     )

@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from itertools import groupby
-from operator import attrgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -61,23 +60,13 @@ from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
 
-class MessageEntry(NamedTuple):
-    """A keyword (none in data lines) with its value, as texts.
-
-    ``tag`` wraps it in XML besides that of the block.
+class MessageBlock(NamedTuple):
+    """Keywords that belong together, with their values as texts; ``name`` is that of the layout,
+    empty outside of blocks.
     """
 
-    keyword: str
-    value: str
-    unit: str | None = None
-    tag: str = ""
-
-
-class MessageBlock(NamedTuple):
-    """Keywords that belong together; ``name`` is that of the layout, empty outside of blocks."""
-
     name: str
-    entries: tuple[MessageEntry, ...]
+    entries: tuple[tuple[Keyword, str], ...]
     comments: tuple[str, ...] = ()
 
 
@@ -113,12 +102,7 @@ def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: s
     unit of the table.
     """
     entries = tuple(
-        MessageEntry(
-            keyword.name,
-            value if isinstance(value, str) else number(value),
-            keyword.unit,
-            keyword.tag,
-        )
+        (keyword, value if isinstance(value, str) else number(value))
         for keyword, value in zip(keywords, values, strict=False)
         if value is not None
     )
@@ -190,12 +174,11 @@ def to_xml(message: Message) -> str:
 def _fill(place: Element, block: MessageBlock) -> None:
     for comment in block.comments:
         SubElement(place, "COMMENT").text = comment
-    for tag, group in groupby(block.entries, attrgetter("tag")):
+    for tag, group in groupby(block.entries, lambda entry: entry[0].tag):
         parent = SubElement(place, tag) if tag else place
-        for entry in group:
-            SubElement(
-                parent, entry.keyword, {"units": entry.unit} if entry.unit else {}
-            ).text = entry.value
+        for keyword, value in group:
+            units = {"units": keyword.unit} if keyword.unit else {}
+            SubElement(parent, keyword.name, units).text = value
 
 
 def to_kvn(message: Message) -> str:
@@ -225,12 +208,12 @@ def to_kvn(message: Message) -> str:
 
 
 def _kvn_lines(block: MessageBlock) -> list[str]:
-    width = max((len(entry.keyword) for entry in block.entries), default=0)
+    width = max((len(keyword.name) for keyword, _ in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
         *(
-            f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "")
-            for word, value, unit, *_ in block.entries
+            f"{keyword.name:<{width}} = {value}" + (f" [{keyword.unit}]" if keyword.unit else "")
+            for keyword, value in block.entries
         ),
     ]
 
