@@ -203,7 +203,6 @@ TOLERANCES = dict(_tolerances())
 BY_THRUSTER = tuple(
     field.name for field in fields(Dispersions) if field.metadata.get("each") == "thruster"
 )
-CORRELATION = quantity("ratio", exclusiveMinimum=-1, exclusiveMaximum=1)
 
 DISPERSIONS = section(
     "DispersionsSection",
@@ -212,7 +211,7 @@ DISPERSIONS = section(
     {
         **TOLERANCES,
         "correlation": optional(
-            rows(row(text(), text(), CORRELATION)),
+            rows(row(text(), text(), quantity("ratio", exclusiveMinimum=-1, exclusiveMaximum=1))),
             "Pairs of inputs that vary together, named as in disperse --json, and their "
             "correlation, -1 to 1. For uniform and triangular inputs it is that of underlying "
             "normals (Gaussian copula).",
@@ -352,7 +351,6 @@ _EPOCH = (
 ANGLE = quantity("angle")
 NUTATION = quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)
 ACUTE_ANGLE = quantity("angle", exclusiveMinimum=0, exclusiveMaximum=RIGHT_ANGLE)
-TILT = quantity("angle", minimum=0, exclusiveMaximum=2 * RIGHT_ANGLE)
 APART = quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)
 DECLINATION = quantity("angle", minimum=-RIGHT_ANGLE, maximum=RIGHT_ANGLE)
 RIGHT_ASCENSION = quantity("right ascension")
@@ -362,15 +360,10 @@ POSITIVE_TIME = quantity("time", exclusiveMinimum=0)
 MASS = quantity("mass", exclusiveMinimum=0)
 MOMENT_OF_INERTIA = quantity("inertia", exclusiveMinimum=0)
 RATE = quantity("rate")
-FORCE = quantity("force", exclusiveMinimum=0)
 LEVER = quantity("length", exclusiveMinimum=0)
-TORQUE = quantity("torque", exclusiveMinimum=0)
 TORQUES = rows(quantity("torque"), 3, 3)
 PRESSURE = quantity("pressure", exclusiveMinimum=0)
-IMPULSE = quantity("impulse", exclusiveMinimum=0)
 SHED = quantity("shed", minimum=0)
-PROBABILITY = quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)
-FREQUENCY = quantity("frequency", exclusiveMinimum=0)
 LEAST_READING = sensor_quantity(minimum=0)
 POSITION = rows(quantity("length"), 3, 3)
 DIRECTION = rows(quantity("number"), 3, 3)
@@ -413,7 +406,9 @@ LOOP_SENSOR = section(
             default="file",
         ),
         "rate": optional(
-            FREQUENCY, "Samples a second, Hz. Default: a continuous signal.", "100 Hz"
+            quantity("frequency", exclusiveMinimum=0),
+            "Samples a second, Hz. Default: a continuous signal.",
+            "100 Hz",
         ),
         "quantisation": optional(
             LEAST_READING,
@@ -868,7 +863,7 @@ THRUSTER = section(
             "Direction of the force on the spacecraft, against the plume. Any length but zero.",
             [1, 0, 0],
         ),
-        "force": optional(FORCE, "Thrust, N.", "10 N"),
+        "force": optional(quantity("force", exclusiveMinimum=0), "Thrust, N.", "10 N"),
         "torque": optional(
             TORQUES,
             "Torque about the centre of mass, N m, in place of position, direction and force.",
@@ -887,7 +882,7 @@ THRUSTER = section(
             {"open_delay": "8 ms", "close_delay": "12 ms"},
         ),
         "impulse_bit": optional(
-            rows(row(POSITIVE_TIME, IMPULSE, POSITIVE_TIME), 2),
+            rows(row(POSITIVE_TIME, quantity("impulse", exclusiveMinimum=0), POSITIVE_TIME), 2),
             "Table from tests, in place of valve. Each row has on-time, s, impulse, N s, and the "
             "time of its centroid after the start of the command, s.",
             [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
@@ -907,7 +902,9 @@ STEERABLE = section(
     "A torquer for any transverse axis. It is fixed in the body during a pulse.",
     {
         "torque": optional(
-            TORQUE, "Torque, N m. Without it its impulses are ideal and take no time.", "20 N m"
+            quantity("torque", exclusiveMinimum=0),
+            "Torque, N m. Without it its impulses are ideal and take no time.",
+            "20 N m",
         ),
         "isp": optional(POSITIVE_TIME, "Specific impulse, s, for the propellant.", "220 s"),
         "lever_arm": optional(LEVER, "Lever arm, m, for the propellant.", "1 m"),
@@ -946,7 +943,7 @@ REQUIREMENT = section(
             "0.5 %",
         ),
         "probability": optional(
-            PROBABILITY,
+            quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1),
             "Share of dispersed flights that must meet it, above 0 and below 1 (or in %).",
             "99.7 %",
         ),
@@ -959,7 +956,9 @@ GOAL = section(
     "End of the motion. Without it H stays where it is, and the spin may change.",
     {
         "tilt": optional(
-            TILT, "Angle of the target axis from H at t = 0, rad, below 180 deg.", "10 deg"
+            quantity("angle", minimum=0, exclusiveMaximum=2 * RIGHT_ANGLE),
+            "Angle of the target axis from H at t = 0, rad, below 180 deg.",
+            "10 deg",
         ),
         "azimuth": optional(
             ANGLE,

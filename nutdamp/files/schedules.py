@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from nutdamp.errors import cure_of, printable
-from nutdamp.files.tabular import Row, Table
+from nutdamp.files.tabular import CellFault, Row, Table
 from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.causes import broken_limits
 from nutdamp.planning.plan import Plan
@@ -87,9 +87,8 @@ def read_blocks(
                 f"the column {name}_s",
             )
     table.expect("channel", "first_sun_pulse", *columns.values(), "count")
-    blocks = {row.line: _block(row, spacecraft, columns) for row in table.rows}
-    rows = [row for row in table.rows if blocks[row.line] is not None]
-    read = tuple(block for block in blocks.values() if block is not None)
+    pairs = table.read(lambda row: _block(row, spacecraft, columns))
+    rows, read = [row for row, _ in pairs], tuple(block for _, block in pairs)
     for index, column, value, possible in misfits(spacecraft, read):
         rows[index].warn(
             column, f"{column} = {value} cannot be commanded, {possible}: flown as given"
@@ -126,9 +125,8 @@ def _expect_apart(rows: Sequence[Row], blocks: Sequence[Block], column: str) -> 
         )
 
 
-def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block | None:
-    """The block of a row, with the ``columns`` of its times; None for a fault."""
-    faults = len(row.table.faults)
+def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block:
+    """The block of a row, with the ``columns`` of its times."""
     channels = [channel.name for channel in spacecraft.channels]
     name = row["channel"]
     if name not in channels:
@@ -149,8 +147,6 @@ def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Bloc
     first = _whole(row, "first_sun_pulse", LATEST)
     count = _whole(row, "count", MOST_FIRED)
     every = _whole(row, "every", LATEST)
-    if len(row.table.faults) > faults:
-        return None
     return Block(name, first, delay or 0.0, width or 0.0, count, every, angle)
 
 
@@ -168,24 +164,23 @@ def _time(row: Row, spacecraft: Spacecraft, name: str, column: str) -> float | N
     """
     commands = spacecraft.commands
     value = row.number(column)
+    counted = column.endswith("_counts")
     if value is None:
         return None
     if value < 0.0:
         row.fault(column, f"{row[column]} is negative; expected at least 0")
-        return None
-    if not column.endswith("_counts") or commands is None:
-        return value
-    if not value.is_integer():
+    elif counted and not value.is_integer():
         row.fault(column, f"expected a whole number of steps, got {row[column]}")
-        return None
-    time = commands.time(name, value)
-    if time is None:
-        row.fault(
-            column,
-            f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, got "
-            f"{row[column]}",
-        )
-    return time
+    elif counted and commands is not None:
+        time = commands.time(name, value)
+        if time is None:
+            row.fault(
+                column,
+                f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, "
+                f"got {row[column]}",
+            )
+        return time
+    return value
 
 
 STARTS = ("start_s", "t_s")
@@ -213,11 +208,7 @@ def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Sched
     steered = {*TORQUE, *IMPULSE} & {*table.header}
     table.expect("on_time_s", *(() if steered else ("channel",)))
     channels = {channel.name: channel for channel in spacecraft.channels}
-    pulses = []
-    for row in table.rows:
-        pulse = _pulse(row, spacecraft, channels)
-        if pulse is not None:
-            pulses.append((row, pulse))
+    pulses = table.read(lambda row: _pulse(row, spacecraft, channels))
     for line, other in overlapping([(row.line, pulse) for row, pulse in pulses]):
         table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
     table.check()
@@ -283,13 +274,12 @@ Channels = Mapping[str, Channel]
 
 
 def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None:
-    """The pulse of a row, with a full tank; None for a fault."""
+    """The pulse of a row, with a full tank; None for numbers that are none. Raises CellFault."""
     name = row.get("channel") or STEERABLE
     if not name.isprintable():
-        row.fault(
+        raise CellFault(
             "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
         )
-        return None
     channel = channels.get(name)
     timing = _timing(row, channel)
     if timing is None:
@@ -299,13 +289,10 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
         if start is None:
             return channel_pulse(channel, t, on_time)
         return on_command(channel, start, on_time)
-    faults = len(row.table.faults)
     torque = _numbers(row, TORQUE) if on_time > 0.0 else None
     impulse = _numbers(row, IMPULSE) if torque is None else torque * on_time
     if impulse is None:
-        if len(row.table.faults) == faults:
-            row.fault("on_time_s" if channel else "channel", _missing(name, channels, on_time))
-        return None
+        raise CellFault("on_time_s" if channel else "channel", _missing(name, channels, on_time))
     principal = spacecraft.inertia.axes.T @ impulse
     push = None if on_time == 0.0 else principal / on_time
     propellant = None
@@ -341,17 +328,15 @@ def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | No
     """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
     column = next((column for column in STARTS if row.get(column)), None)
     if column is None:
-        row.fault(STARTS[0], "the time is missing")
-        return None
+        raise CellFault(STARTS[0], "the time is missing")
     time, on_time = row.number(column), row.number("on_time_s")
     if time is None or on_time is None:
         return None
     if on_time < 0.0:
-        row.fault(
+        raise CellFault(
             "on_time_s",
             f"{on_time:g} s is negative; 0 s or more is expected (0 for an ideal impulse)",
         )
-        return None
     centre = 0.5 * on_time
     valve = None if channel is None or on_time == 0.0 else channel.valve
     if channel is not None and valve is not None:
@@ -372,16 +357,14 @@ def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | No
         centre = thrust.centroid
     start = time if column == STARTS[0] else time - centre
     if start < -1e-9:  # s; an earlier start is no rounding of 0
-        row.fault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
-        return None
+        raise CellFault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
     t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
     if not Pulse(t, on_time, "", np.zeros(3)).resolved:
-        row.fault(
+        raise CellFault(
             "on_time_s",
             f"{on_time:g} s is too short at {t:g} s, where times are "
             f"{math.ulp(t + 0.5 * on_time):.2g} s apart",
         )
-        return None
     begins = max(start, 0.0) if column == STARTS[0] else t - centre
     return t, on_time, None if valve is None else begins
 

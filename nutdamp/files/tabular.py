@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,6 +205,8 @@ def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) ->
             stream.write(number_rows(rows[name] for name in HEADER))
 
 
+Value = TypeVar("Value")
+
 LARGEST = 1e15  # larger magnitudes are nothing of a spacecraft, and would overflow later
 MOST_BYTES = 32 << 20  # size of a file, many times more than its most rows take
 MOST_ROWS = 100_000  # rows of a file
@@ -238,6 +240,10 @@ class Row(dict[str, str]):
         others.
         """
         self.table.warnings.setdefault(subject, []).append((self.line, text))
+
+
+class CellFault(Exception):
+    """A fault in a column of a row, in words, after which the row tells no more."""
 
 
 class Table:
@@ -287,6 +293,21 @@ class Table:
                 self.rows.append(Row(self, line, cells))
             else:
                 self.fault(line, "", f"{len(cells)} values under {len(self.header)} columns")
+
+    def read(self, read_row: Callable[[Row], Value | None]) -> list[tuple[Row, Value]]:
+        """The rows without faults and what is read of each; the faults of the others are kept."""
+        pairs = []
+        for row in self.rows:
+            faults = len(self.faults)
+            try:
+                value = read_row(row)
+            except CellFault as wrong:
+                if len(self.faults) == faults:  # else it follows from those
+                    row.fault(*wrong.args)
+                continue
+            if value is not None and len(self.faults) == faults:
+                pairs.append((row, value))
+        return pairs
 
     def check(self) -> None:
         """Raise FaultyFile with the faults so far: of a column the first `MOST_FAULTS`, and how
