@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -366,7 +366,7 @@ def _with(text: str, path: KeyPath, value: str) -> str:
 def _added(text: str, parent: Node, path: KeyPath, value: str) -> str:
     """The text with a new key in a mapping; further steps of the path become flow mappings."""
     for step in reversed(path[1:]):
-        value = f"{{{key_text(step)}: {value}}}"
+        value = flow({step: value})
     entry = f"{key_text(path[0])}: {value}"
     if not isinstance(parent.value, dict):
         raise BadRequest(f"{dotted(path)}: its parent holds no keys")
@@ -395,12 +395,12 @@ NOISE = 1e-13  # nutation, rad, that is rounding
 
 
 class Edit(NamedTuple):
-    """A value at a path: its text, or a number of a ``kind`` of quantity, in SI, for the unit that
-    the file has.
+    """A value at a path, as `flow` has it, or a number of a ``kind`` of quantity, in SI, for the
+    unit that the file has.
     """
 
     path: KeyPath
-    value: str | float
+    value: Any
     kind: str = ""
 
 
@@ -444,11 +444,11 @@ def inertia_edits(tree: Node, later: Later) -> Edits:
         yield Edit(("inertia", "C"), inertia.C, "inertia")
         return
     tensor = inertia.axes @ np.diag(inertia.moments) @ inertia.axes.T
-    rows = ", ".join(map(flow_list, 0.5 * (tensor + tensor.T)))
+    tensor = 0.5 * (tensor + tensor.T)
     if tree.get("inertia", "tensor") is None:
-        yield Edit(("inertia",), f"{{tensor: [{rows}]}}")
+        yield Edit(("inertia",), {"tensor": tensor})
     else:
-        yield Edit(("inertia", "tensor"), f"[{rows}]")
+        yield Edit(("inertia", "tensor"), tensor)
 
 
 def rate_edits(tree: Node, later: Later) -> Edits:
@@ -469,7 +469,7 @@ def rate_edits(tree: Node, later: Later) -> Edits:
         yield Edit(("state", "nutation"), angle, "angle")
         yield Edit(("state", "phase"), phase, "angle")
     else:
-        yield Edit(("state",), flow_list(rates))
+        yield Edit(("state",), rates)
 
 
 def epoch_after(epoch: str, time: float) -> str:
@@ -492,9 +492,8 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         turned = start.seen_in(old.frame, turned.epoch)
     of = tree.get("attitude", "of")
     vector = None if of is None else str(of.value)
-    if tree.get("attitude", "spin_axis") is None:
-        keys = {"quaternion": flow_list(turned.quaternion)}
-    else:
+    keys: dict[str, Any] = {"quaternion": turned.quaternion}
+    if tree.get("attitude", "spin_axis") is not None:
         axis = attitude.unit(after.momentum) if vector == "momentum" else after.axis
         axis = turned.axes.T @ start.axes @ axis
         first = attitude.rotate(turned.quaternion, np.array([1.0, 0.0, 0.0]))
@@ -506,16 +505,15 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         ascension, declination, phase = (
             as_before(tree.get("attitude", *path), angle, "angle") for path, angle in places.items()
         )
-        keys = {"spin_axis": f"[{ascension}, {declination}]", "phase": phase}
+        keys = {"spin_axis": [ascension, declination], "phase": phase}
     for key in ("epoch", "frame"):
         value = getattr(turned, key)
         if value is not None and (old is None or value != getattr(old, key)):
             keys[key] = value
     # No attitude before, or from the side of the Sun, which may be elsewhere by now.
     if tree.get("attitude") is None or tree.get("attitude", "sun_phase") is not None:
-        whole = keys | {"of": vector, "epoch": turned.epoch, "frame": turned.frame}
-        entries = ", ".join(f"{key}: {value}" for key, value in whole.items() if value)
-        yield Edit(("attitude",), f"{{{entries}}}")
+        others = {"of": vector, "epoch": turned.epoch, "frame": turned.frame}
+        yield Edit(("attitude",), keys | {key: value for key, value in others.items() if value})
         return
     for key, value in keys.items():
         yield Edit(("attitude", key), value)
@@ -541,7 +539,7 @@ def carry_text(
         text = edited(text, {positions: value or "null"})
     tree = read_tree(text, name)[0]
     values = {
-        path: value if isinstance(value, str) else as_before(tree.get(*path), value, kind)
+        path: as_before(tree.get(*path), value, kind) if kind else flow(value)
         for path, value, kind in edits(tree)
     }
     return edited(text, values, {"state": "omega0"} if ("state",) in values else {})
@@ -569,6 +567,13 @@ def number(value: float) -> str:
     return text if "e" not in text or "." in text else text.replace("e", ".0e")
 
 
-def flow_list(values: Iterable[float]) -> str:
-    """Numbers as a list in one line."""
-    return f"[{', '.join(map(number, values))}]"
+def flow(value: object) -> str:
+    """A value as YAML on one line; a text stands as it is, keys in quotes where they need some."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Mapping):
+        entries = (f"{key_text(key)}: {flow(part)}" for key, part in value.items())
+        return f"{{{', '.join(entries)}}}"
+    if isinstance(value, Iterable):
+        return f"[{', '.join(map(flow, value))}]"
+    return number(float(value))  # type: ignore[arg-type]
