@@ -108,13 +108,17 @@ def _contents(
         root, unplaced = overlay(root, settings)
         faults += unplaced
     facts = Facts(root)
-    unreadable = {finding.path for finding in facts.findings if not finding.at_key}
+    misspelt = [finding for finding in facts.findings if finding.at_key]
+    senseless = [finding for finding in facts.findings if not finding.at_key]
+    unreadable = {finding.path for finding in senseless}
     broken = (
         finding
         for finding in findings(facts, aimed=aimed)
         if finding.at_key or finding.path not in unreadable
     )
-    faults += [_placed(finding, root, name) for finding in (*facts.findings, *broken)]
+    # this is the order of faults at one place
+    ordered = (*misspelt, *broken, *senseless)
+    faults += [_placed(finding, root, name) for finding in ordered]
     for doubt in in_order(_placed(finding, root, name) for finding in doubts(facts)):
         warn(doubt)
     if faults:
