@@ -386,10 +386,6 @@ def test_commands_write_it(
     run(*command, "now.yaml", "-o", "next.yaml", status=0)
     carried = nutdamp.load(tmp_path / "next.yaml")
     assert float(present(present(carried.attitude).epoch)[17:19]) >= lasts
-
-
-def test_its_moment_needs_its_name(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "now.yaml").write_text(TEXTS["symmetric"])
     assert "-o" in run("simulate", "now.yaml", "--scheme", "none", "--at", "5s", status=2).stderr
 
 

@@ -332,8 +332,10 @@ def test_a_whole_block_gives_way_to_a_flow_value_and_a_key_to_another_name() -> 
 
 
 @pytest.mark.parametrize("end", ["", "\n", "\n\n# the end\n", "\n# the end"])
-def test_a_text_may_end_as_it_likes(end: str) -> None:
-    made = edited("a: 1\nb: {c: 2}" + end, {("d",): "4", ("b", "e"): "5"})
+@pytest.mark.parametrize("text", ["a: 1\nb: {c: 2}", '{\n\t"a": 1,\n\t"b": {"c": 2}\n}'])
+def test_a_text_may_end_as_it_likes(text: str, end: str) -> None:
+    """JSON indented with tabs, too."""
+    made = edited(text + end, {("d",): "4", ("b", "e"): "5"})
     assert plain(made) == {"a": 1, "b": {"c": 2, "e": 5}, "d": 4}
     assert made.endswith(end)
 
