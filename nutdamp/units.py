@@ -266,8 +266,8 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         angle = int(whole) + int(minutes) / 60.0 + float(seconds.strip(".") or 0.0) / 3600.0
         raise ValueError(
             f"{shown(text)} has minutes; write decimal degrees: "
-            f"{sign}{angle * (15.0 if mark == 'h' else 1.0):.8g} deg "
-            "(a declination is from -90 deg to 90 deg)"
+            f"{sign}{angle * (15.0 if mark == 'h' else 1.0):.8g} deg (a declination is from -90 "
+            "deg to 90 deg)"
         )
     match = _QUANTITY.fullmatch(text)
     # A "unit" that starts like the rest of a number has a thousands separator before it.
@@ -389,16 +389,16 @@ Instance = TypeVar("Instance")
 Record = TypeVar("Record", bound=Any)
 
 
-def expect(fits: bool, name: str, value: object, expected: str) -> None:
-    """Raise BadRequest for an argument whose ``value`` does not fit."""
+def expect(fits: bool, name: str, value: Any, expected: str) -> Any:
+    """The ``value`` of an argument; raises BadRequest where it does not fit."""
     if not fits:
         raise BadRequest(f"{name}: expected {expected}, got {as_given(value)}")
+    return value
 
 
 def instance(name: str, value: Any, kind: type[Instance], expected: str) -> Instance:
     """``value``, where it is of the ``kind``; raises BadRequest."""
-    expect(isinstance(value, kind), name, value, expected)
-    return cast("Instance", value)
+    return cast("Instance", expect(isinstance(value, kind), name, value, expected))
 
 
 def path(name: str, value: str | PathLike[str], expected: str = "the name of a file") -> str:
@@ -417,37 +417,38 @@ def changes(value: Any) -> Mapping[str, object]:
 
 def end_of_flight(value: Any) -> float:
     """A time in s after t = 0; raises BadRequest."""
-    expect(is_number(value) and value > 0.0, "until", value, "a time after t = 0, in s")
-    return float(value)
+    fits = is_number(value) and value > 0.0
+    return float(expect(fits, "until", value, "a time after t = 0, in s"))
 
 
 def seed(value: Any) -> int:
     """Seed of random numbers; raises BadRequest."""
     fits = isinstance(value, int) and 0 <= value <= LARGEST_SEED
-    expect(fits, "seed", value, "a whole number from 0 to 2**64 - 1")
-    return int(value)
+    return int(expect(fits, "seed", value, "a whole number from 0 to 2**64 - 1"))
 
 
 def tilt(value: Any, name: str = "largest") -> float:
     """An angle in rad between 0 and a right angle; raises BadRequest."""
     fits = is_number(value) and 0.0 < value < 0.5 * math.pi
-    expect(fits, name, value, "an angle in rad between 0 and a right angle")
-    return float(value)
+    return float(expect(fits, name, value, "an angle in rad between 0 and a right angle"))
 
 
 def count(name: str, value: Any, least: int = 1) -> int:
     """A whole number of at least ``least``, which is no less than 1; raises BadRequest."""
     fits = is_count(value) and value >= least
-    expect(fits, name, value, f"a whole number of at least {least}")
-    return int(value)
+    return int(expect(fits, name, value, f"a whole number of at least {least}"))
 
 
 def shifts(value: Any) -> tuple[float, ...]:
     """Angles in rad, infinite where any will do; raises BadRequest."""
     angles = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     fits = [(is_number(angle) or angle == math.inf) and angle >= 0.0 for angle in angles]
-    expected = "angles of at least 0, in rad, such as (0.0, math.inf)"
-    expect(all(fits) and fits != [], "allow", value, expected)
+    expect(
+        all(fits) and fits != [],
+        "allow",
+        value,
+        "angles of at least 0, in rad, such as (0.0, math.inf)",
+    )
     return tuple(map(float, angles))
 
 
@@ -466,8 +467,8 @@ def thresholds(value: Any) -> tuple[tuple[float, float], ...]:
 
 def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
     """One of the ``names``; raises BadRequest."""
-    expect(isinstance(value, str) and value in names, name, value, f"one of {', '.join(names)}")
-    return str(value)
+    fits = isinstance(value, str) and value in names
+    return str(expect(fits, name, value, f"one of {', '.join(names)}"))
 
 
 def is_number(value: Any) -> bool:
@@ -502,9 +503,11 @@ def replaced(value: Record, fields: Mapping[str, object], types: dict[str, Any])
         if name not in declared:
             raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(declared)}")
         vector = declared[name].startswith("Vector") and entry is not None
-        fits = _is_vector(entry) if vector else _fits(entry, kinds[name])
-        expect(fits, name, entry, "three numbers" if vector else declared[name])
-        values[name] = np.array(entry, dtype=float) if vector else entry
+        if vector:
+            expect(_is_vector(entry), name, entry, "three numbers")
+            values[name] = np.array(entry, dtype=float)
+        else:
+            values[name] = expect(_fits(entry, kinds[name]), name, entry, declared[name])
     return dataclasses.replace(value, **values)
 
 

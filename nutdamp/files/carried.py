@@ -35,14 +35,12 @@ from nutdamp.files.editing import (
     as_before,
     carry_text,
     epoch_after,
-    flow_list,
     key_text,
     motion_edits,
     overlay,
 )
-from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source
-from nutdamp.files.yaml import Node, Place, read_tree
+from nutdamp.files.yaml import KeyPath, Node, Place, read_tree
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Trapezoid
@@ -161,7 +159,7 @@ def _edits(tree: Node, moved_on: Later, time: float) -> Edits:
         for axis in np.flatnonzero(after.center_of_mass != before.center_of_mass).tolist():
             yield Edit(("center_of_mass", axis), float(after.center_of_mass[axis]), "length")
     elif after.center_of_mass is not None:
-        yield Edit(("center_of_mass",), flow_list(after.center_of_mass))
+        yield Edit(("center_of_mass",), after.center_of_mass)
     if (
         after.tank is not None
         and before.tank is not None
@@ -304,9 +302,7 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
             if own is not None:
                 yield Edit((*path, key), values[key])
         if own is None:
-            yield Edit(
-                path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
-            )
+            yield Edit(path, values)
     if (bias := large.get(f"bias_{ACCELERATION}")) is not None:
         yield Edit(("loop", "sensor", "bias"), bias, "acceleration")
     yield from _disturbance_edits(tree, before, carried.time)
@@ -315,35 +311,32 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     drawn_alone = tree.get("dispersions", "inertia_tensor") is not None
     for key in () if drawn_alone else ("A", "C"):
         if sigmas[key] > 0.0:
-            yield Edit(
-                ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}"
-            )
-    rates = ", ".join(
-        f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3)
-    )
-    yield Edit(("dispersions", "omega0"), f"[{rates}]")
+            percent = 100.0 * sigmas[key] / estimates[key]
+            yield Edit(("dispersions", key), {"normal": f"{percent:.6g} %"})
+    rates = [math.degrees(sigmas[f"omega0_{axis}"]) for axis in (1, 2, 3)]
+    yield Edit(("dispersions", "omega0"), [{"normal": f"{rate:.6g} deg/s"} for rate in rates])
     if WHEEL in sigmas:
-        yield Edit(("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}")
+        yield Edit(("dispersions", "wheel_momentum"), {"normal": f"{sigmas[WHEEL]:.6g} N m s"})
     factors, tolerances = carried.factors, fit.model.spacecraft.dispersions
     if factors:
         thrust = {} if tolerances is None else tolerances.thrust
-        listed = [
-            (name, size.kind, size.size) for name, size in thrust.items() if name not in factors
-        ]
-        listed += [(name, "normal", sigma / factor) for name, (factor, sigma) in factors.items()]
-        sizes = (
-            f"{key_text(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in listed
-        )
-        yield Edit(("dispersions", "thrust"), "{" + ", ".join(sizes) + "}")
+        sizes = {
+            name: {size.kind: f"{100.0 * size.size:.6g} %"}
+            for name, size in thrust.items()
+            if name not in factors
+        }
+        for name, (factor, sigma) in factors.items():
+            sizes[name] = {"normal": f"{100.0 * sigma / factor:.6g} %"}
+        yield Edit(("dispersions", "thrust"), sizes)
     if carried.tilt is not None:
-        yield Edit(("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}")
-    pairs = correlations(carried, tolerances)
+        tilt = math.degrees(carried.tilt)
+        yield Edit(("dispersions", "attitude"), {"normal": f"{tilt:.6g} deg"})
+    pairs = [
+        [key_text(first), key_text(second), f"{value:.{DIGITS}f}"]
+        for first, second, value in correlations(carried, tolerances)
+    ]
     if pairs:
-        rows = ", ".join(
-            f"[{key_text(first)}, {key_text(second)}, {value:.{DIGITS}f}]"
-            for first, second, value in pairs
-        )
-        yield Edit(("dispersions", "correlation"), f"[{rows}]")
+        yield Edit(("dispersions", "correlation"), pairs)
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:

@@ -19,15 +19,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-import yaml
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, SenselessOption, cure_of
-from nutdamp.files.fields import KeyPath
-from nutdamp.files.yaml import MAX_DEPTH, Node, Place, dotted, read_tree, read_value
+from nutdamp.files.yaml import MAX_DEPTH, KeyPath, Node, Place, dotted, read_tree, read_value
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -207,8 +205,9 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
         raise _NoPlaceError(
             f"expected a position, such as {dotted((*behind, 0))}: the entries have no names"
         )
-    cure = cure_of(step, texts)
-    raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
+    raise _NoPlaceError(
+        f"no entry of {dotted(behind)} has the name {shown(step)}; {cure_of(step, texts)}"
+    )
 
 
 def _of_python(value: object, place: Place, path: KeyPath = ()) -> Node:
@@ -236,8 +235,10 @@ def _of_python(value: object, place: Place, path: KeyPath = ()) -> Node:
         entries = [_of_python(child, place, (*path, row)) for row, child in enumerate(value)]
         return Node(entries, place)
     where = ": ".join(filter(None, (str(place), dotted(path))))
-    expected = "a number, a text, a date, a list or a mapping"
-    raise BadRequest(f"{where}: expected {expected}, got {type(value).__name__}")
+    raise BadRequest(
+        f"{where}: expected a number, a text, a date, a list or a mapping, got "
+        f"{type(value).__name__}"
+    )
 
 
 def aimed(
@@ -331,79 +332,53 @@ def edited(
     for path, value in values.items():
         text = _with(text, path, value)
     for old, new in (renamed or {}).items():
-        key, _ = _find(_root(text), old)
-        if key is not None:
-            text = text[: key.start_mark.index] + new + text[key.end_mark.index :]
+        place = read_tree(text, "edited")[0].keys.get(old)
+        if place is not None:
+            begin = text[: place.offset]
+            text = begin + re.sub(rf"""^(['"]?){old}\1""", new, text[place.offset :])
     return text
 
 
 def _with(text: str, path: KeyPath, value: str) -> str:
-    held: yaml.Node = _root(text)
+    held = read_tree(text, "edited")[0]
     indent = ""
     for depth, step in enumerate(path):
-        key, node = _find(held, step)
+        node = held.get(step)
         if node is None:
             return _added(text, held, path[depth:], value)
         where = dotted(path[: depth + 1])
-        begins = node.start_mark.index
-        if key is not None and begins < key.end_mark.index:
+        key = held.keys.get(str(step))
+        if key is not None and node.place.offset < key.offset:
             raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
-        anchor = re.match(r"&(\S+)", text[begins:])
+        anchor = re.match(r"&(\S+)", text[node.place.offset :])
         if anchor and f"*{anchor[1]}" in text:
             raise BadRequest(
                 f"{where} has the alias *{anchor[1]}: write that out, for it to be changed"
             )
-        held = node
         # The entries of a block may stand as far left as its key; a flow value may not.
         indent = ""
-        if key is not None and node.start_mark.line > key.start_mark.line:
-            indent = "  " if node.start_mark.column <= key.start_mark.column else ""
-    return text[: held.start_mark.index] + indent + value + text[_end(held) :]
+        if key is not None and node.place.line > key.line and node.place.column <= key.column:
+            indent = "  "
+        held = node
+    return text[: held.place.offset] + indent + value + text[held.end :]
 
 
-def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:
+def _added(text: str, parent: Node, path: KeyPath, value: str) -> str:
     """The text with a new key in a mapping; further steps of the path become flow mappings."""
     for step in reversed(path[1:]):
-        value = f"{{{key_text(step)}: {value}}}"
+        value = flow({step: value})
     entry = f"{key_text(path[0])}: {value}"
-    if not isinstance(parent, yaml.MappingNode):
+    if not isinstance(parent.value, dict):
         raise BadRequest(f"{dotted(path)}: its parent holds no keys")
-    if parent.flow_style:
-        last = _end(parent) - 1
+    if parent.flow:
+        last = parent.end - 1
         comma = "" if not parent.value or text[:last].rstrip().endswith(",") else ", "
         at = len(text[:last].rstrip()) if comma else last
         return text[:at] + comma + entry + text[at:]
-    line_end = text.find("\n", _end(parent))
+    line_end = text.find("\n", parent.end)
     at = len(text) if line_end < 0 else line_end
-    indent = " " * parent.value[0][0].start_mark.column
+    indent = " " * (next(iter(parent.keys.values())).column - 1)
     return f"{text[:at]}\n{indent}{entry}{text[at:]}"
-
-
-def _root(text: str) -> yaml.MappingNode:
-    root = yaml.compose(text, Loader=yaml.SafeLoader)
-    assert isinstance(root, yaml.MappingNode)
-    return root
-
-
-def _find(parent: yaml.Node, step: str | int) -> tuple[yaml.Node | None, yaml.Node | None]:
-    """The key, of a mapping, and the value at a step; None where there is none."""
-    if isinstance(parent, yaml.MappingNode):
-        return next(
-            ((name, value) for name, value in parent.value if name.value == step), (None, None)
-        )
-    if isinstance(parent, yaml.SequenceNode) and isinstance(step, int) and step < len(parent.value):
-        return None, parent.value[step]
-    return None, None
-
-
-def _end(node: yaml.Node) -> int:
-    """End of the text of a value; of a block, that of its last entry."""
-    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
-        last = node.value[-1]
-        return _end(last[1] if isinstance(node, yaml.MappingNode) else last)
-    if isinstance(node, yaml.ScalarNode) and node.style in ("|", ">"):
-        return node.end_mark.index - 1
-    return int(node.end_mark.index)
 
 
 def key_text(step: str | int) -> str:
@@ -420,12 +395,12 @@ NOISE = 1e-13  # nutation, rad, that is rounding
 
 
 class Edit(NamedTuple):
-    """A value at a path: its text, or a number of a ``kind`` of quantity, in SI, for the unit that
-    the file has.
+    """A value at a path, as `flow` has it, or a number of a ``kind`` of quantity, in SI, for the
+    unit that the file has.
     """
 
     path: KeyPath
-    value: str | float
+    value: Any
     kind: str = ""
 
 
@@ -469,11 +444,11 @@ def inertia_edits(tree: Node, later: Later) -> Edits:
         yield Edit(("inertia", "C"), inertia.C, "inertia")
         return
     tensor = inertia.axes @ np.diag(inertia.moments) @ inertia.axes.T
-    rows = ", ".join(map(flow_list, 0.5 * (tensor + tensor.T)))
+    tensor = 0.5 * (tensor + tensor.T)
     if tree.get("inertia", "tensor") is None:
-        yield Edit(("inertia",), f"{{tensor: [{rows}]}}")
+        yield Edit(("inertia",), {"tensor": tensor})
     else:
-        yield Edit(("inertia", "tensor"), f"[{rows}]")
+        yield Edit(("inertia", "tensor"), tensor)
 
 
 def rate_edits(tree: Node, later: Later) -> Edits:
@@ -494,7 +469,7 @@ def rate_edits(tree: Node, later: Later) -> Edits:
         yield Edit(("state", "nutation"), angle, "angle")
         yield Edit(("state", "phase"), phase, "angle")
     else:
-        yield Edit(("state",), flow_list(rates))
+        yield Edit(("state",), rates)
 
 
 def epoch_after(epoch: str, time: float) -> str:
@@ -517,9 +492,8 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         turned = start.seen_in(old.frame, turned.epoch)
     of = tree.get("attitude", "of")
     vector = None if of is None else str(of.value)
-    if tree.get("attitude", "spin_axis") is None:
-        keys = {"quaternion": flow_list(turned.quaternion)}
-    else:
+    keys: dict[str, Any] = {"quaternion": turned.quaternion}
+    if tree.get("attitude", "spin_axis") is not None:
         axis = attitude.unit(after.momentum) if vector == "momentum" else after.axis
         axis = turned.axes.T @ start.axes @ axis
         first = attitude.rotate(turned.quaternion, np.array([1.0, 0.0, 0.0]))
@@ -531,16 +505,15 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         ascension, declination, phase = (
             as_before(tree.get("attitude", *path), angle, "angle") for path, angle in places.items()
         )
-        keys = {"spin_axis": f"[{ascension}, {declination}]", "phase": phase}
+        keys = {"spin_axis": [ascension, declination], "phase": phase}
     for key in ("epoch", "frame"):
         value = getattr(turned, key)
         if value is not None and (old is None or value != getattr(old, key)):
             keys[key] = value
     # No attitude before, or from the side of the Sun, which may be elsewhere by now.
     if tree.get("attitude") is None or tree.get("attitude", "sun_phase") is not None:
-        whole = keys | {"of": vector, "epoch": turned.epoch, "frame": turned.frame}
-        entries = ", ".join(f"{key}: {value}" for key, value in whole.items() if value)
-        yield Edit(("attitude",), f"{{{entries}}}")
+        others = {"of": vector, "epoch": turned.epoch, "frame": turned.frame}
+        yield Edit(("attitude",), keys | {key: value for key, value in others.items() if value})
         return
     for key, value in keys.items():
         yield Edit(("attitude", key), value)
@@ -566,7 +539,7 @@ def carry_text(
         text = edited(text, {positions: value or "null"})
     tree = read_tree(text, name)[0]
     values = {
-        path: value if isinstance(value, str) else as_before(tree.get(*path), value, kind)
+        path: as_before(tree.get(*path), value, kind) if kind else flow(value)
         for path, value, kind in edits(tree)
     }
     return edited(text, values, {"state": "omega0"} if ("state",) in values else {})
@@ -594,6 +567,13 @@ def number(value: float) -> str:
     return text if "e" not in text or "." in text else text.replace("e", ".0e")
 
 
-def flow_list(values: Iterable[float]) -> str:
-    """Numbers as a list in one line."""
-    return f"[{', '.join(map(number, values))}]"
+def flow(value: object) -> str:
+    """A value as YAML on one line; a text stands as it is, keys in quotes where they need some."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Mapping):
+        entries = (f"{key_text(key)}: {flow(part)}" for key, part in value.items())
+        return f"{{{', '.join(entries)}}}"
+    if isinstance(value, Iterable):
+        return f"[{', '.join(map(flow, value))}]"
+    return number(float(value))  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import Table
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
-from nutdamp.files.tabular import csv_text, structured, whole_file
+from nutdamp.files.tabular import csv_text, number_rows, structured, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propagation import Flight
@@ -42,28 +42,27 @@ LONGEST_STEP = 0.1  # rad; the body turns by no more in one step of the script
 def basilisk_script(plan: Plan) -> str:
     """The text of the script; raises BadRequest for dissipation, a wheel, or moments that fall."""
     spacecraft = plan.spacecraft
-    if spacecraft.dissipation is not None:
-        raise BadRequest(
-            "a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file"
-        )
-    if spacecraft.inertia.wheel != 0.0:
-        raise BadRequest(
-            "a Basilisk script flies one rigid body: it has no wheel, "
-            "and the spacecraft file has one"
-        )
-    if shed(spacecraft) is not None:
-        problem = (
-            "a Basilisk script flies constant moments of inertia: "
-            "leave tank.inertia_per_kg out of the spacecraft"
-        )
-        raise BadRequest(
-            f"{problem} file, and plan without it, if the moments may count as constant"
-        )
+    wheel = spacecraft.inertia.wheel
+    unfit = {
+        "a rigid body: leave dissipation out of the spacecraft file": spacecraft.dissipation,
+        "one rigid body: it has no wheel, and the spacecraft file has one": wheel,
+        "constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft file, and "
+        "plan without it, if the moments may count as constant": shed(spacecraft) is not None,
+    }
+    for words, holds in unfit.items():
+        if holds:
+            raise BadRequest(f"a Basilisk script flies {words}")
     rates, quaternion = spacecraft.inertia.in_file_axes(
         spacecraft.initial.rates, spacecraft.initial.quaternion
     )
-    about = f"{plan.scheme} schedule for {spacecraft.name}, status {plan.verdict.status.value}"
-    title = " ".join(about.split()).replace("\\", "/").replace('"', "'")
+    title = (
+        " ".join(
+            f"{plan.scheme} schedule for {spacecraft.name}, "
+            f"status {plan.verdict.status.value}".split()
+        )
+        .replace("\\", "/")
+        .replace('"', "'")
+    )
     return SCRIPT.read_text(encoding="utf-8").format(
         title=title,
         version=__version__,
@@ -162,14 +161,16 @@ def reference(spacecraft: Spacecraft) -> Reference:
         names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
         lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
         place = "add" if start is None else "add there"
-        cure = f"{place}\nattitude:\n{lines}"
         raise BadRequest(
-            f"this format needs {names}, which the spacecraft file does not give; {cure}"
+            f"this format needs {names}, which the spacecraft file does not give; "
+            f"{place}\nattitude:\n{lines}"
         )
     frame = "EME2000" if start.frame in PRECESSED else start.frame
     if frame not in AXES:
-        problem = f"{frame!r} is no frame that the format knows; expected one of {', '.join(AXES)}"
-        raise Unsuitable(("attitude", "frame"), problem)
+        raise Unsuitable(
+            ("attitude", "frame"),
+            f"{frame!r} is no frame that the format knows; expected one of {', '.join(AXES)}",
+        )
     return Reference(Epoch.parse(start.epoch), frame)
 
 
@@ -188,8 +189,10 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
         turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
         counts.append(max(math.ceil(turn / TURN) + 1, LEAST_RECORDS))
     if (total := sum(counts)) > MOST_RECORDS:
-        cure = "choose an earlier end (until)"
-        raise BadRequest(f"the track would have {total} records, more than {MOST_RECORDS}; {cure}")
+        raise BadRequest(
+            f"the track would have {total} records, more than {MOST_RECORDS}; choose an earlier "
+            "end (until)"
+        )
     previous: Vector | None = None  # the quaternion of the record before
     for leg, count in zip(legs, counts, strict=True):
         begin, end = (round(time * NANOSECONDS) for time in (leg.start, min(leg.end, until)))
@@ -314,8 +317,10 @@ def samples_file(flown: Dispersion) -> Callable[[IO[bytes]], None]:
 
 def _values(core: Results) -> Array:
     if core.values is None:
-        counted = f"more than {EXACT_CASES:,} cases are counted and not kept"
-        raise BadRequest(f"{counted}: name a file for them, nutdamp.disperse(plan, csv=…)")
+        raise BadRequest(
+            f"more than {EXACT_CASES:,} cases are counted and not kept: name a file for them, "
+            "nutdamp.disperse(plan, csv=…)"
+        )
     return core.values[:, : core.done]
 
 
@@ -341,14 +346,8 @@ class SamplesWriter:
         """The cases from ``first`` (from 0) on, with their `Results.values`."""
         for begin in range(0, values.shape[1], BLOCK):  # texts of all would take much memory
             part = values[:, begin : begin + BLOCK]
-            columns = map(_texts, sample_columns(self._study, first + begin, part))
-            lines = map(",".join, zip(*columns, strict=True))
-            self._stream.write(("\r\n".join(lines) + "\r\n").encode())
-
-
-def _texts(values: NDArray[Any]) -> list[str]:
-    """Numbers that read back as they were; NaN is empty."""
-    return [""] * len(values) if math.isnan(values[0]) else list(map(repr, values.tolist()))
+            columns = sample_columns(self._study, first + begin, part)
+            self._stream.write(number_rows(columns))
 
 
 class FlownCases(Protocol):

@@ -6,20 +6,19 @@ Unreadable values are skipped, so that rules work beside any other fault.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.files.fields import SMALLEST, KeyPath
-from nutdamp.files.keys import thrust_behind
-from nutdamp.files.yaml import Node
+from nutdamp.files.fields import SMALLEST, Finding, Values
+from nutdamp.files.keys import SPACECRAFT, thrust_behind
+from nutdamp.files.yaml import KeyPath, Node
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.units import parse
 
 Vector = NDArray[np.float64]
 
@@ -30,26 +29,98 @@ SYMMETRIC = 1e-9
 """Asymmetry of a tensor, over its largest entry, that ten printed digits leave."""
 
 
-class Finding(NamedTuple):
-    """Something wrong at ``path``, which need not exist; ``at_key``: the key and not its value."""
+class Facts(Values):
+    """The values of a spacecraft file by path, and what follows from them: ``principal`` moments,
+    kg m², and axes, the ``inertia`` of a body that can spin so, and the ``spin`` about principal
+    axis 3, rad/s; each None where it is not known, or impossible.
+    """
 
-    path: KeyPath
-    problem: str
-    at_key: bool = False
-
-
-class Facts:
-    """The values of a tree that can be read, in SI."""
+    principal: tuple[rigid_body.Moments, Vector] | None = None
+    inertia: Inertia | None = None
+    spin: float | None = None
 
     def __init__(self, root: Node) -> None:
-        self.root = root
+        super().__init__(root)
+        self.contents = self.read(SPACECRAFT, root)
+        self.findings += self._body()
+
+    def _body(self) -> Iterator[Finding]:
+        """Findings where no body has these moments and this spin."""
+        path: KeyPath = ("inertia", "tensor")
+        A, C = self.number("inertia", "A"), self.number("inertia", "C")
+        rows = [self.vector(*row) for row in self.below(*path)]
+        wheel = self.number("wheel", "momentum") or 0.0
+        spin_path: KeyPath = ("state", "spin")
+        spin, omega0 = self.number(*spin_path), self.vector("omega0")
+        if self.has("omega0"):
+            spin_path = ("omega0", 2)
+            spin = None if omega0 is None else float(omega0[2])
+        fault = None
+        if len(rows) == 3 and all(row is not None for row in rows):
+            fault = tensor_fault(np.array(rows))
+            if fault is None:
+                self.principal = rigid_body.principal_axes(symmetric(np.array(rows)))
+            if omega0 is not None:
+                spin_path = ("omega0",)
+                spin = None
+                if self.principal is not None:  # a rate that is rounding is zero
+                    along = float(self.principal[1][:, 2] @ omega0)
+                    spin = along if abs(along) > CANCELLED * math.hypot(*omega0) else 0.0
+        elif A is not None and C is not None and C <= 2 * A:
+            self.principal = ((A, A, C), np.eye(3))
+        elif A is not None and C is not None:
+            fault = Finding(
+                ("inertia", "C"),
+                f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: not physically possible (A and C "
+                "swapped?); at most 2 A (a flat disc)",
+            )
+        if fault is not None:
+            yield fault
+        if spin is not None and abs(spin) < SMALLEST and not wheel:
+            spin = None
+            yield Finding(
+                spin_path,
+                "the spin is zero; expected a rate about axis 3, or a wheel; without both there is "
+                "no nutation",
+            )
+        self.spin = spin
+        if self.principal is None:
+            return
+        moments = self.principal[0]
+        stable = rigid_body.growth(moments, spin or 0.0, wheel).stable
+        if rows and wheel and spin is not None and not stable:
+            low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
+            yield Finding(
+                ("wheel", "momentum"),
+                f"nutation about the spin axis grows with it; expected a momentum below {low:.4g} "
+                f"or above {high:.4g} N m s",
+            )
+        unstable = {
+            "degenerate": "the same principal moment as just one other axis",
+            "intermediate": "the middle principal moment",
+        }
+        kind = rigid_body.axis_class(moments)
+        if kind in unstable and not wheel:
+            named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
+            values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
+            yield Finding(
+                path,
+                f"the spin axis has {unstable[kind]} ({values} kg m^2): free spin about it is "
+                "unstable; spin about the axis of the smallest or largest moment, or hold it by a "
+                "wheel",
+            )
+            return
+        with suppress(ValueError):
+            self.inertia = Inertia(*self.principal, wheel)
 
     def has(self, *path: str | int) -> bool:
         """True where something is at ``path``."""
         return self.root.get(*path) is not None
 
     def value(self, *path: str | int) -> object:
-        """The text, number, dict or list of nodes at ``path``; None where there is none."""
+        """The text, number, dict or list of nodes at ``path`` as it is written; None where there is
+        none.
+        """
         node = self.root.get(*path)
         return None if node is None else node.value
 
@@ -58,20 +129,17 @@ class Facts:
         value = self.value(*path)
         return value if isinstance(value, str) else None
 
-    def number(self, kind: str, *path: str | int) -> float | None:
-        """The quantity at ``path``."""
-        node = self.root.get(*path)
-        try:
-            return None if node is None else parse(node.plain(), kind)
-        except ValueError:
-            return None
+    def number(self, *path: str | int) -> float | None:
+        """The quantity at ``path``, SI; None where there is none, or no sound one."""
+        value = self.by_path.get(path)
+        return value if isinstance(value, float) else None
 
-    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
-        """The ``size`` quantities at ``path``; None unless all can be read."""
-        if len(self.below(*path)) != size:
+    def vector(self, *path: str | int) -> Vector | None:
+        """The quantities in the list at ``path``; None unless all can be read."""
+        entries = self.by_path.get(path)
+        if not isinstance(entries, list) or None in entries:
             return None
-        numbers = [self.number(kind, *path, index) for index in range(size)]
-        return None if None in numbers else np.array(numbers, dtype=np.float64)
+        return np.array(entries, dtype=np.float64)
 
     def below(self, *path: str | int) -> list[KeyPath]:
         """Paths of the entries at ``path``."""
@@ -92,57 +160,6 @@ class Facts:
         return [path for path in paths if not value or self.text(*path) == value]
 
     @cached_property
-    def tensor(self) -> Vector | None:
-        """The inertia tensor (3, 3) kg m²."""
-        rows = [self.vector("inertia", 3, "inertia", "tensor", row) for row in range(3)]
-        if len(self.below("inertia", "tensor")) != 3 or any(row is None for row in rows):
-            return None
-        return np.array(rows)
-
-    @cached_property
-    def principal(self) -> tuple[rigid_body.Moments, Vector] | None:
-        """Principal moments, kg m², and axes; None where no body has them."""
-        if self.tensor is not None:
-            sound = tensor_fault(self.tensor) is None
-            return rigid_body.principal_axes(symmetric(self.tensor)) if sound else None
-        A, C = (self.number("inertia", "inertia", key) for key in "AC")
-        return None if A is None or C is None or A <= 0.0 or C <= 0.0 else ((A, A, C), np.eye(3))
-
-    @cached_property
-    def inertia(self) -> Inertia | None:
-        """The inertia; None where no body has it, or it cannot spin so."""
-        if self.principal is None or moments_fault(np.array(self.principal[0])) is not None:
-            return None
-        try:
-            return Inertia(*self.principal, self.wheel)
-        except ValueError:
-            return None
-
-    @cached_property
-    def wheel(self) -> float:
-        """Momentum of the wheel, N m s; zero where there is none."""
-        return self.number("momentum", "wheel", "momentum") or 0.0
-
-    @cached_property
-    def stated_spin(self) -> tuple[KeyPath, float | None]:
-        """The rate about principal axis 3, rad/s, and its path; a rate that is rounding is zero."""
-        if not self.has("omega0"):
-            return ("state", "spin"), self.number("rate", "state", "spin")
-        omega0 = self.vector("rate", 3, "omega0")
-        if omega0 is None or (self.tensor is not None and self.principal is None):
-            return ("omega0",), None
-        if self.tensor is None or self.principal is None:
-            return ("omega0", 2), float(omega0[2])
-        spin = float(self.principal[1][:, 2] @ omega0)
-        return ("omega0",), spin if abs(spin) > CANCELLED * math.hypot(*omega0) else 0.0
-
-    @cached_property
-    def spin(self) -> float | None:
-        """The rate about principal axis 3, rad/s; None where it is zero without a wheel."""
-        spin = self.stated_spin[1]
-        return spin if spin is not None and (abs(spin) >= SMALLEST or self.wheel) else None
-
-    @cached_property
     def names(self) -> dict[str, dict[str, KeyPath]]:
         """Paths of the thrusters and of the channels by their names."""
         entries = ((self.text(*path, "name"), path) for path in self.below("thrusters"))
@@ -155,14 +172,13 @@ class Facts:
         """Thrust in N of each thruster and of the torquer; None where it is not known."""
         forces: dict[str, float | None] = {}
         for name, path in self.names["thruster"].items():
-            torque = self.vector("torque", 3, *path, "torque")
+            torque = self.vector(*path, "torque")
             size = None if torque is None else math.hypot(*torque)
-            lever = self.number("length", *path, "lever_arm") or None
-            forces[name] = self.number("force", *path, "force") or thrust_behind(size, lever)
+            lever = self.number(*path, "lever_arm")
+            forces[name] = self.number(*path, "force") or thrust_behind(size, lever)
         if self.has("steerable") or not self.below("thrusters"):
-            lever = self.number("length", "steerable", "lever_arm") or None
-            size = self.number("torque", "steerable", "torque")
-            forces[STEERABLE] = thrust_behind(size, lever)
+            size = self.number("steerable", "torque")
+            forces[STEERABLE] = thrust_behind(size, self.number("steerable", "lever_arm"))
         return forces
 
 
@@ -183,8 +199,10 @@ def tensor_fault(tensor: Vector) -> Finding | None:
     skew = np.abs(tensor - tensor.T)
     if skew.max() > SYMMETRIC * np.abs(tensor).max():
         column, row = map(int, np.unravel_index(np.argmax(skew), skew.shape))
-        mirrored = f"{tensor[column, row]:g} at [{column}][{row}]; both must be equal"
-        problem = f"not symmetric: {tensor[row, column]:g} here, but {mirrored}"
+        problem = (
+            f"not symmetric: {tensor[row, column]:g} here, but {tensor[column, row]:g} at "
+            f"[{column}][{row}]; both must be equal"
+        )
         return Finding((*path, row, column), problem)
     fault = moments_fault(np.asarray(np.linalg.eigvalsh(symmetric(tensor))))
     return None if fault is None else Finding(path, fault)
@@ -200,6 +218,7 @@ def moments_fault(moments: Vector) -> str | None:
         wrong = " or ".join(f"{moment:g}" for moment in moments if moment <= limit)
         return f"{values}; all three must be above 0, not {wrong}"
     if largest > (smallest + middle) * (1.0 + SYMMETRIC):
-        rule = "the largest must not exceed the sum of the other two (triangle inequality)"
-        return f"{values}: {rule}"
+        return (
+            f"{values}: the largest must not exceed the sum of the other two (triangle inequality)"
+        )
     return None

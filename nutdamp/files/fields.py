@@ -1,290 +1,331 @@
-r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once,
-and as JSON Schema.
+"""Kinds of values of a file: each reads a value of the tree and has its JSON Schema.
 
-A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are
-those of YAML and JSON values, lists, tuples and mappings of them, sections, and any of them
-`Annotated` with `Rule`\ s. Kinds of values in a spacecraft file follow: quantities with units and
-bounds, directions, lists, names, dates, counts.
+A file is declared as a `section`, a mapping of keys to kinds: quantities with units and bounds,
+texts, choices, lists, names, further sections. `Values` walks the tree by that declaration, once,
+and keeps what it reads by path with everything that is wrong.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cache
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
-from types import NoneType, UnionType
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    Literal,
-    Self,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 from nutdamp.errors import listed, nearest
+from nutdamp.files.yaml import KeyPath, Node
 from nutdamp.units import KINDS, parse, pattern, shown
-
-KeyPath = tuple[str | int, ...]
-"""Keys and list positions that lead from the root to a value."""
-
-Problems = list[tuple[KeyPath, str]]
-"""Problems and the paths to their values."""
 
 REQUIRED: Any = ...
 """Default of a key that cannot be left out."""
 
 
-@dataclass(frozen=True, slots=True)
-class Key:
-    """A key of a section: the ``type`` of its value, its description, and its default."""
+class Finding(NamedTuple):
+    """Something wrong at ``path``, which need not exist; ``at_key``: the key and not its value."""
 
-    type: Any
-    default: Any
-    description: str
-    examples: list[Any]
+    path: KeyPath
+    problem: str
+    at_key: bool = False
 
 
-def Field(description: str, *examples: Any, default: Any = REQUIRED) -> Any:
-    """A key of a `Section`; its type is the annotation,
-    and one that may be None is so by default.
-    """
-    return Key(None, default, description, list(examples))
+class Values:
+    """Values of the tree at ``root`` that can be read, by their paths, and what is wrong."""
 
+    def __init__(self, root: Node) -> None:
+        self.root = root
+        self.by_path: dict[KeyPath, Any] = {}
+        self.findings: list[Finding] = []
 
-class Rule:
-    """Rule that an annotation adds to a type."""
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The meaning of ``value``, which ``inner`` reads by the type. Raises ValueError with the
-        problem.
-        """
-        return inner(value)
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """JSON Schema, where ``inner`` gives that of the type."""
-        return inner()
-
-
-class Length(Rule):
-    """Number of entries (characters of a text), both ends included."""
-
-    def __init__(self, least: int, most: int | None = None) -> None:
-        self.least, self.most = least, most
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The value as the type reads it; raises ValueError for another length."""
-        long = isinstance(value, list) and self.most is not None and len(value) > self.most
-        entries = (
-            value if long else inner(value)
-        )  # entries too many are one fault, whatever they are
-        if entries is None:  # not of the type
+    def read(self, kind: ValueKind, node: Node, path: KeyPath = ()) -> Any:
+        """The meaning of a node of this kind; None, and a finding, where it has none."""
+        if node.value is None:
+            named = path and isinstance(path[-1], str)
+            cure = "give a value, or leave the key out" if named else "expected a value"
+            self.findings.append(Finding(path, f"empty; {cure}"))
             return None
-        if len(entries) < self.least == 1:
-            raise ValueError("empty; expected an entry")
-        if isinstance(entries, str) and self.most is not None and len(entries) > self.most:
-            raise ValueError(f"{len(entries)} characters long; expected at most {self.most}")
-        if long or len(entries) < self.least:
-            count = f"{self.least} to {self.most}" if self.most != self.least else f"{self.least}"
-            count = f"at least {self.least}" if self.most is None else count
-            comma = decimal_comma(value) if long else ""
-            raise ValueError(f"expected {count} entries, got {len(entries)}{comma}")
-        return entries
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Schema with the keywords of the length."""
-        keywords = inner()
-        of = {"array": "Items", "object": "Properties", "string": "Length"}[keywords["type"]]
-        return {
-            **keywords,
-            f"min{of}": self.least,
-            **({} if self.most is None else {f"max{of}": self.most}),
-        }
-
-
-def decimal_comma(entries: list[Any]) -> str:
-    """Words for a list with too many entries, a number of which is parted by a decimal comma:
-    [0,5 deg, 1 deg].
-    """
-    for whole, rest in pairwise(entries):
-        if type(whole) is int and isinstance(rest, str) and rest[:1].isdigit():
-            return f"; '{whole},{rest}' has a decimal comma; write {whole}.{rest}"
-    return ""
-
-
-class Within(Rule):
-    """The range of a whole number, both ends included."""
-
-    def __init__(self, least: int, most: int) -> None:
-        self.least, self.most = least, most
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The number; raises ValueError where it is out of range."""
-        number = inner(value)
-        if number is not None and not self.least <= number <= self.most:
-            expected = f"at least {self.least}" if number < self.least else f"at most {self.most}"
-            raise ValueError(_mismatch(value, expected))
-        return number
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Schema with the range."""
-        return {**inner(), "minimum": self.least, "maximum": self.most}
-
-
-class Section:
-    """A mapping of the file: no key that is not named here."""
-
-    written: ClassVar[str] = "a mapping {key: value, …}"
-    """Form of the section, for messages."""
-
-    schema_extra: ClassVar[dict[str, Any]] = {}
-    """Further keywords of its JSON Schema."""
-
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        vars(self).update(values)
-
-    @classmethod
-    @cache
-    def fields(cls) -> dict[str, Key]:
-        """Its keys, by name; a word of Python has a line behind it in the class."""
-        types = get_type_hints(cls, include_extras=True)
-        keys = {}
-        for name in types:
-            key = getattr(cls, name, None)
-            if isinstance(key, Key):
-                optional = key.default is REQUIRED and NoneType in get_args(types[name])
-                keys[name.removesuffix("_")] = replace(
-                    key, type=types[name], default=None if optional else key.default
-                )
-        return keys
-
-    @classmethod
-    def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
-        """The section in ``value``; ``problems`` get its own, but for unknown keys and empty
-        values.
-        """
-        if not isinstance(value, dict):
-            problems.append((path, _mismatch(value, cls.written)))
+        try:
+            self.by_path[path] = value = kind.read(node, path, self)
+        except ValueError as wrong:
+            self.findings.append(Finding(path, str(wrong)))
             return None
-        values = {}
-        for name, key in cls.fields().items():
-            if value.get(name) is not None:
-                values[name] = _read(key.type, value[name], problems, (*path, name))
-            else:
-                values[name] = key.default
-                if key.default is REQUIRED and name not in value:
-                    what = key.description.partition(". ")[0].rstrip(".")
-                    problems.append(((*path, name), f"missing; {what[:1].lower()}{what[1:]}"))
-        return cls(values)
-
-
-def section_of(annotation: Any) -> type[Section] | None:
-    """The section within a type, such as that of a list's entries."""
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return annotation
-    return next(filter(None, map(section_of, get_args(annotation))), None)
-
-
-_WORDS = {str: "a text", int: "a whole number", bool: "true or false", list: "a list [value, …]"}
-_WORDS |= {tuple: _WORDS[list], dict: "a mapping {key: value, …}"}
-
-
-def _mismatch(value: Any, expected: str) -> str:
-    return f"expected {expected}, got {shown(value)}"
-
-
-def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any:
-    """The meaning of a value of this type; problems are added to ``problems``."""
-    if value is None or annotation is Any:
         return value
-    origin = get_origin(annotation)
-    parts = get_args(annotation)
-    if origin is Annotated:
-        return _ruled(parts[0], parts[1:], value, problems, path)
-    if origin in (Union, UnionType):
-        kinds = [part for part in parts if part is not NoneType]
-        expected = _either(kinds)
-        if expected and not isinstance(value, list | dict):
-            problems.append((path, _mismatch(value, expected)))
-            return None
-        # A section is meant by a mapping, the other type by all else.
-        meant = next(
-            (kind for kind in kinds if isinstance(value, dict) == (section_of(kind) is kind)),
-            kinds[0],
-        )
-        return _read(meant, value, problems, path)
-    if origin is Literal:
-        if value in parts:
+
+
+Read = Callable[[Node, KeyPath, Values], Any]
+"""The meaning of a node at a path, in SI; ValueError with the problem where it has none. Entries
+below it are read, by their own kinds, by `Values.read`.
+"""
+
+
+@dataclass(frozen=True)
+class ValueKind:
+    """Kind of a value: how it is ``read``, its JSON ``schema``, the kinds of its ``parts``, and the
+    ``form`` in which people write it.
+
+    A section has ``keys`` and the ``definition`` to which its schema refers.
+    """
+
+    read: Read
+    schema: Mapping[str, Any]
+    parts: tuple[ValueKind, ...] = ()
+    form: str = ""
+    keys: Mapping[str, Key] = field(default_factory=dict)
+    definition: Mapping[str, Any] = field(default_factory=dict)
+
+    def within(self) -> Iterator[ValueKind]:
+        """This kind and all below it, but for those of the keys of a section."""
+        yield self
+        for part in self.parts:
+            yield from part.within()
+
+
+class Key(NamedTuple):
+    """A key of a section: the kind of its value, its description, examples, and default."""
+
+    kind: ValueKind
+    description: str
+    examples: tuple[Any, ...]
+    default: Any = REQUIRED
+
+
+def required(kind: ValueKind, description: str, *examples: Any) -> Key:
+    """A key that must be there."""
+    return Key(kind, description, examples)
+
+
+def optional(kind: ValueKind, description: str, *examples: Any, default: Any = None) -> Key:
+    """A key that may be left out."""
+    return Key(kind, description, examples, default)
+
+
+def mismatch(node: Node, expected: str) -> ValueError:
+    """The error for a value of another kind."""
+    return ValueError(f"expected {expected}, got {shown(node.plain())}")
+
+
+A_LIST, A_MAPPING = "a list [value, …]", "a mapping {key: value, …}"
+
+
+def whole(minimum: int, largest: int) -> ValueKind:
+    """A whole number, both ends of its range included."""
+
+    def read(node: Node, _: KeyPath, _values: Values) -> int:
+        if not isinstance(node.value, int) or isinstance(node.value, bool):
+            raise mismatch(node, "a whole number")
+        if node.value < minimum:
+            raise mismatch(node, f"at least {minimum}")
+        if node.value > largest:
+            raise mismatch(node, f"at most {largest}")
+        return node.value
+
+    schema = {"type": "integer", "minimum": minimum, "maximum": largest}
+    return ValueKind(read, schema, form="a whole number")
+
+
+def flag() -> ValueKind:
+    """true or false."""
+
+    def read(node: Node, _: KeyPath, _values: Values) -> bool:
+        if not isinstance(node.value, bool):
+            raise mismatch(node, "true or false")
+        return node.value
+
+    return ValueKind(read, {"type": "boolean"})
+
+
+def text(longest: int | None = None) -> ValueKind:
+    """A text of at most ``longest`` printable characters, at least one of them not a blank; any
+    text without that.
+    """
+
+    def read(node: Node, _: KeyPath, _values: Values) -> str:
+        value = node.value
+        if not isinstance(value, str):
+            quotes = "" if isinstance(value, dict | list) else "; put it in quotes"
+            raise ValueError(f"{mismatch(node, 'a text')}{quotes}")
+        if longest is None:
             return value
-        close = nearest(value, parts) if isinstance(value, str) else None
-        expected = _mismatch(value, listed([f"'{choice}'" for choice in parts], "or"))
-        problems.append((path, expected + (f"; did you mean {shown(close)}?" if close else "")))
-        return None
-    section = section_of(annotation)
-    if section is annotation:
-        return section.read(value, problems, path)
-    plain: Any = origin or annotation
-    if not isinstance(value, list if plain is tuple else plain) or (
-        plain is int and isinstance(value, bool)
-    ):
-        quoted = "; put it in quotes" if plain is str and not isinstance(value, dict | list) else ""
-        problems.append((path, _mismatch(value, _WORDS[plain]) + quoted))
-        return None
-    if isinstance(value, dict):
-        key_type, entry_type = parts
+        if not value:
+            raise ValueError("empty; expected an entry")
+        if len(value) > longest:
+            raise ValueError(f"{len(value)} characters long; expected at most {longest}")
+        if not (value.strip() and value.isprintable()):
+            raise ValueError(f"{shown(value)} is no name; expected printable characters")
+        return value
+
+    lengths = {} if longest is None else {"minLength": 1, "maxLength": longest}
+    return ValueKind(read, {"type": "string", **lengths}, form="a text")
+
+
+def choice(*words: str) -> ValueKind:
+    """One of some words."""
+
+    def read(node: Node, _: KeyPath, _values: Values) -> object:
+        if node.value in words:
+            return node.value
+        problem = mismatch(node, listed([f"'{word}'" for word in words], "or"))
+        close = nearest(node.value, words) if isinstance(node.value, str) else None
+        raise ValueError(f"{problem}; did you mean {shown(close)}?" if close else str(problem))
+
+    values = {"enum": [*words]} if len(words) > 1 else {"const": words[0]}
+    return ValueKind(read, {"type": "string", **values}, form=listed(words, "or"))
+
+
+def row(*parts: ValueKind) -> ValueKind:
+    """A list of as many entries as there are kinds, each of its own."""
+
+    def read(node: Node, path: KeyPath, values: Values) -> list[Any]:
+        entries = _entries(node, len(parts), len(parts))
+        kinds = enumerate(zip(parts, entries, strict=True))
+        return [values.read(kind, entry, (*path, place)) for place, (kind, entry) in kinds]
+
+    counts = {"minItems": len(parts), "maxItems": len(parts)}
+    schema = {"type": "array", "prefixItems": [part.schema for part in parts], **counts}
+    return ValueKind(read, schema, parts)
+
+
+def rows(part: ValueKind, minimum: int = 0, largest: int | None = None) -> ValueKind:
+    """A list of entries of one kind, ``minimum`` to ``largest`` of them."""
+
+    def read(node: Node, path: KeyPath, values: Values) -> list[Any]:
+        entries = enumerate(_entries(node, minimum, largest))
+        return [values.read(part, entry, (*path, place)) for place, entry in entries]
+
+    counts = {"minItems": minimum, "maxItems": largest}
+    bounds = {name: count for name, count in counts.items() if count}
+    return ValueKind(read, {"type": "array", "items": part.schema, **bounds}, (part,))
+
+
+def _entries(node: Node, minimum: int, largest: int | None) -> list[Node]:
+    """The entries of a list of ``minimum`` to ``largest``; raises ValueError for another value."""
+    entries = node.value
+    if not isinstance(entries, list):
+        raise mismatch(node, A_LIST)
+    if not entries and minimum == 1:
+        raise ValueError("empty; expected an entry")
+    if len(entries) < minimum or len(entries) > (largest or math.inf):
+        expected = f"{minimum}" if minimum == largest else f"{minimum} to {largest}"
+        expected = f"at least {minimum}" if largest is None else expected
+        comma = ""
+        for one, other in pairwise(entry.value for entry in entries):
+            # a decimal comma makes two entries of one: [0,5 deg, 1 deg]
+            if type(one) is int and isinstance(other, str) and other[:1].isdigit():
+                comma = f"; '{one},{other}' has a decimal comma; write {one}.{other}"
+                break
+        raise ValueError(f"expected {expected} entries, got {len(entries)}{comma}")
+    return entries
+
+
+def named(part: ValueKind, minimum: int = 0) -> ValueKind:
+    """A mapping of names to values of one kind, ``minimum`` of them or more."""
+
+    def read(node: Node, path: KeyPath, values: Values) -> dict[str, Any]:
+        if not isinstance(node.value, dict):
+            raise mismatch(node, A_MAPPING)
+        if len(node.value) < minimum:
+            raise ValueError("empty; expected an entry")
         entries = {}
-        for key, entry in value.items():
-            place = (*path, key) if key else path  # an empty name is not in the file
-            name = _read(key_type, key, problems, place)
-            entries[name] = _read(entry_type, entry, problems, place)
+        for name, entry in node.value.items():
+            values.read(NAME, Node(name, entry.place), (*path, name))
+            entries[name] = values.read(part, entry, (*path, name))
         return entries
-    if plain is list:
-        return [
-            _read(parts[0], entry, problems, (*path, index)) for index, entry in enumerate(value)
-        ]
-    if plain is tuple:
-        if len(parts) != len(value):
-            comma = decimal_comma(value) if len(value) > len(parts) else ""
-            problems.append((path, f"expected {len(parts)} entries, got {len(value)}{comma}"))
-            return None
-        return [
-            _read(parts[index], entry, problems, (*path, index))
-            for index, entry in enumerate(value)
-        ]
-    return value
+
+    schema = {"type": "object", "additionalProperties": part.schema}
+    return ValueKind(read, schema | ({"minProperties": minimum} if minimum else {}), (part,))
 
 
-def _ruled(
-    annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Problems, path: KeyPath
-) -> Any:
-    """The meaning of a value by the rules about its type, the last of which is the outermost."""
-    if not rules:
-        return _read(annotation, value, problems, path)
-    try:
-        return rules[-1].read(
-            value, lambda inner: _ruled(annotation, rules[:-1], inner, problems, path)
-        )
-    except ValueError as wrong:
-        problems.append((path, str(wrong)))
-        return None
+def either(several: ValueKind, section: ValueKind) -> ValueKind:
+    """A list in one form, or a mapping in another."""
+
+    def read(node: Node, path: KeyPath, values: Values) -> Any:
+        if not isinstance(node.value, list | dict):
+            raise mismatch(node, f"{A_LIST} or {A_MAPPING}")
+        meant = several if isinstance(node.value, list) else section
+        return meant.read(node, path, values)
+
+    schema = {"oneOf": [several.schema, section.schema]}
+    return ValueKind(read, schema, (several, section))
 
 
-def _either(parts: list[Any]) -> str:
-    """Words for what a union of a list and a mapping expects; empty for another union."""
-    kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
-    if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {
-        "dict",
-        list,
-    }:
-        return f"{_WORDS[list]} or {_WORDS[dict]}"
-    return ""
+def section(
+    title: str, about: str, keys: Mapping[str, Key], extra: Mapping[str, Any] | None = None
+) -> ValueKind:
+    """A mapping with the ``keys`` declared and no others, read as a namespace with the defaults of
+    those left out; ``extra`` are further keywords of its JSON Schema.
+    """
 
+    def read(node: Node, path: KeyPath, values: Values) -> SimpleNamespace:
+        if not isinstance(node.value, dict):
+            raise mismatch(node, A_MAPPING)
+        for unknown in [name for name in node.value if name not in keys]:
+            cure = _put_right(node, unknown, keys)
+            values.findings.append(Finding((*path, unknown), f"unknown key; {cure}", at_key=True))
+        contents = {}
+        for name, key in keys.items():
+            child = node.value.get(name)
+            contents[name] = key.default
+            if child is not None:
+                value = values.read(key.kind, child, (*path, name))
+                contents[name] = key.default if child.value is None else value
+            elif key.default is REQUIRED:
+                what = key.description.partition(". ")[0].rstrip(".")
+                values.findings.append(
+                    Finding((*path, name), f"missing; {what[:1].lower()}{what[1:]}")
+                )
+        return SimpleNamespace(**contents)
+
+    properties = {}
+    for name, key in keys.items():
+        texts = {"description": key.description, "examples": [*key.examples]}
+        default = {} if key.default in (None, REQUIRED) else {"default": key.default}
+        properties[name] = {**key.kind.schema, **texts, **default}
+    needed = [name for name, key in keys.items() if key.default is REQUIRED]
+    definition = {
+        **{"type": "object", "title": title, "description": about},
+        **{"properties": properties, "additionalProperties": False, **(extra or {})},
+        **({"required": needed} if needed else {}),
+    }
+    reference = {"$ref": f"#/$defs/{title}"}
+    return ValueKind(read, reference, keys=keys, definition=definition)
+
+
+def definitions(kind: ValueKind) -> dict[str, Any]:
+    """Definitions of the sections below one, by their titles; those that others refer to first."""
+    below: dict[str, Any] = {}
+    for key in kind.keys.values():
+        for part in key.kind.within():
+            if "$ref" in part.schema:
+                below |= {**definitions(part), part.definition["title"]: part.definition}
+    return below
+
+
+def _put_right(node: Node, key: str, keys: Mapping[str, Key]) -> str:
+    """The cure of an unknown key; the value of a misspelt one gets its place, to be checked too."""
+    assert isinstance(node.value, dict)
+    dropped = node.value.pop(key)
+    beside = bool(node.keys[key].setting)
+    meant = nearest(key, [name for name in keys if beside or name not in node.value])
+    if meant:
+        if meant not in node.value:
+            node.value[meant], node.keys[meant] = dropped, node.keys[key]
+        return f"did you mean {shown(meant)}?"
+    if "tensor" in keys and MOMENT.fullmatch(key):
+        return "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
+    if key == "<<":
+        return "merge keys are of YAML 1.1; write the keys out"
+    if ":" in key:
+        return "put a space behind the colon"
+    if key[:1].isdigit():
+        return "decimals take a point, not a comma"
+    return f"known here: {', '.join(keys)}"
+
+
+# keys for parts of a tensor
+MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)
 
 # smaller values that must be above zero count as zero, in SI: a division by them could overflow
 SMALLEST = 1e-15
@@ -298,79 +339,52 @@ _BOUNDS = {
 RIGHT_ANGLE = parse("90 deg", "angle")
 
 
-class Quantity(Rule):
-    """Annotation of a field that holds a quantity of ``kind``; the bounds are keywords of JSON
-    Schema, in SI.
-    """
+def quantity(kind: str, **bounds: float) -> ValueKind:
+    """A quantity of a ``kind`` of `units.KINDS`; the bounds are keywords of JSON Schema, in SI."""
+    angle = kind == "angle"
+    words = (
+        f"{_BOUNDS[name][1]} "
+        + (f"{limit / RIGHT_ANGLE * 90:g} deg" if angle and limit else f"{limit:g}")
+        for name, limit in bounds.items()
+    )
+    expected = f"expected {KINDS[kind].noun} {' and '.join(words)}"
 
-    def __init__(self, kind: str, **bounds: float) -> None:
-        self.kind, self.bounds = kind, bounds
+    def allows(result: float) -> bool:
+        return all(_BOUNDS[name][0](result, limit) for name, limit in bounds.items())
 
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
-        """SI value; raises ValueError with the values allowed."""
-        result = parse(value, self.kind)
-        if not self._allows(result):
-            # An angle without unit that would be in range in degrees, or a share that would be in
-            # %.
-            hints = {
-                "angle": f" (read as radians; write {value} deg)",
-                "ratio": f"; write {value} % if that is meant",
-            }
-            unit = "deg" if self.kind == "angle" else "%"
-            hint = hints.get(self.kind, "")
-            if hint and (
-                isinstance(value, str) or not self._allows(parse(f"{value} {unit}", self.kind))
-            ):
-                hint = ""
-            raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
-        if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
-            smallest = f"in SI at least {SMALLEST:g}"
+    def read(node: Node, _: KeyPath, _values: Values) -> float:
+        value = node.plain()
+        result = parse(value, kind)
+        if not allows(result):
+            # An angle without unit in range in degrees, or a share in %.
+            unit = {"angle": "deg", "ratio": "%"}.get(kind, "")
+            hint = ""
+            if unit and not isinstance(value, str) and allows(parse(f"{value} {unit}", kind)):
+                hint = f"; write {value} {unit} if that is meant"
+                hint = f" (read as radians; write {value} deg)" if angle else hint
+            raise ValueError(f"{shown(value)} is out of range; {expected}{hint}")
+        if result < bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             raise ValueError(
-                f"{shown(value)} is too small to be real; expected {self.range}, {smallest}"
+                f"{shown(value)} is too small to be real; {expected}, in SI at least {SMALLEST:g}"
             )
         return result
 
-    def _allows(self, result: float) -> bool:
-        return all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items())
-
-    @property
-    def range(self) -> str:
-        """``an angle of at least 0 and below 90 deg``."""
-        angle = self.kind == "angle"
-        bounds = (
-            f"{_BOUNDS[name][1]} "
-            + (f"{limit / RIGHT_ANGLE * 90:g} deg" if angle and limit else f"{limit:g}")
-            for name, limit in self.bounds.items()
-        )
-        return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
-        """A number in the bounds, or one with a unit."""
-        number = {"type": "number", **self.bounds}
-        if not KINDS[self.kind].factors:
-            return number
-        return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
+    number = {"type": "number", **bounds}
+    if not KINDS[kind].factors:
+        return ValueKind(read, number, form="plain numbers, without unit")
+    return ValueKind(read, {"anyOf": [number, unit_text(kind)]}, form=unit_form(kind))
 
 
-Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
-AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=RIGHT_ANGLE)]
-Time = Annotated[float, Quantity("time", minimum=0)]
-PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
-THREE = Length(3, 3)
-Position = Annotated[list[Annotated[float, Quantity("length")]], THREE]
-Direction = Annotated[list[Annotated[float, Quantity("number")]], THREE]
+def unit_text(kind: str) -> dict[str, Any]:
+    """JSON Schema of a text with a unit."""
+    return {"type": "string", "pattern": pattern(kind)}
+
+
+def unit_form(*kinds: str) -> str:
+    """``unit s, ms or min``."""
+    units = dict.fromkeys(unit for kind in kinds for unit in KINDS[kind].factors)
+    return f"unit {listed([*units], 'or')}"
+
+
 LONGEST_NAME = 80  # characters: a line of a screen
-
-
-class Printable(Rule):
-    """Annotation of a text of printable characters, at least one of them not a blank."""
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The text; raises ValueError for another."""
-        text = inner(value)
-        if text is not None and not (text.strip() and text.isprintable()):
-            raise ValueError(f"{shown(text)} is no name; expected printable characters")
-        return text
-
-
-Name = Annotated[str, Length(1, LONGEST_NAME), Printable()]
+NAME = text(LONGEST_NAME)

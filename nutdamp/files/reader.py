@@ -15,31 +15,19 @@ from dataclasses import fields, replace
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    Literal,
-    NamedTuple,
-    TypeVar,
-    Union,
-    get_args,
-    get_origin,
-)
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from nutdamp import units
-from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
-from nutdamp.files import keys
-from nutdamp.files.facts import CANCELLED, Facts, Finding, Vector, force_vector, symmetric
-from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
-from nutdamp.files.keys import LoopSection, by_name, dispersions, thrust_behind
+from nutdamp.errors import Fault, FaultyFile, in_order, warn
+from nutdamp.files.facts import CANCELLED, Facts, Vector, force_vector
+from nutdamp.files.fields import Finding, definitions
+from nutdamp.files.keys import SPACECRAFT, dispersions, thrust_behind
 from nutdamp.files.rules import correlation_findings, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude
-from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.equipment import (
     Channel,
     Commands,
@@ -60,7 +48,6 @@ from nutdamp.spacecraft.model import (
     Requirement,
     Spacecraft,
 )
-from nutdamp.units import shown
 
 if TYPE_CHECKING:
     from nutdamp.files.editing import Setting
@@ -112,28 +99,31 @@ def _contents(
     settings: Sequence[Setting],
     warn: Warn,
     aimed: bool,
-) -> tuple[keys.SpacecraftFile, Node]:
-    """The contents of a file without faults, and its tree."""
+) -> Facts:
+    """The values of a file without faults."""
     root, faults = read_tree(text, name)
     if settings:
         from nutdamp.files.editing import overlay  # keys set beside the file
 
         root, unplaced = overlay(root, settings)
         faults += unplaced
-    faulty = [*_spelling(root, keys.SpacecraftFile, ())]
     facts = Facts(root)
-    faulty += findings(facts, aimed=aimed)
-    problems: Problems = []
-    contents = keys.SpacecraftFile.read(root.plain(), problems)
-    unreadable = {path for path, _ in problems}
-    faulty = [finding for finding in faulty if finding.at_key or finding.path not in unreadable]
-    faulty += [Finding(path, problem) for path, problem in problems]
-    faults += [_placed(finding, root, name) for finding in faulty]
+    misspelt = [finding for finding in facts.findings if finding.at_key]
+    senseless = [finding for finding in facts.findings if not finding.at_key]
+    unreadable = {finding.path for finding in senseless}
+    broken = (
+        finding
+        for finding in findings(facts, aimed=aimed)
+        if finding.at_key or finding.path not in unreadable
+    )
+    # this is the order of faults at one place
+    ordered = (*misspelt, *broken, *senseless)
+    faults += [_placed(finding, root, name) for finding in ordered]
     for doubt in in_order(_placed(finding, root, name) for finding in doubts(facts)):
         warn(doubt)
-    if faults or contents is None:
+    if faults:
         raise FaultyFile(faults)
-    return contents, root
+    return facts
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
@@ -146,54 +136,6 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
     return place.fault(name, dotted(path), finding.problem)
 
 
-def _spelling(
-    node: Node, model: type[Section] | None, path: KeyPath, named: bool = False
-) -> Iterator[Finding]:
-    """Unknown keys and empty values below ``node``, whose keys are fields of ``model``, or
-    (``named``) names of such.
-
-    A misspelt key is put right in the tree, so that its value is checked too; any other unknown key
-    is dropped.
-    """
-    fields = model.fields() if model else {}
-    named = named and isinstance(node.value, dict) and by_name(node.value)
-    if fields and isinstance(node.value, dict) and not named:
-        for key in [key for key in node.value if key not in fields]:
-            dropped = node.value.pop(key)
-            beside = bool(node.keys[key].setting)
-            meant = nearest(key, [field for field in fields if beside or field not in node.value])
-            cure = f"did you mean {shown(meant)}?" if meant else f"known here: {', '.join(fields)}"
-            if meant and meant not in node.value:
-                node.value[meant], node.keys[meant] = dropped, node.keys[key]
-            elif "tensor" in fields and MOMENT.fullmatch(key):
-                cure = (
-                    "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
-                )
-            elif key == "<<":
-                cure = "merge keys are of YAML 1.1; write the keys out"
-            elif ":" in key:
-                cure = "put a space behind the colon"
-            elif key[:1].isdigit():
-                cure = "decimals take a point, not a comma"
-            yield Finding((*path, key), f"unknown key; {cure}", at_key=True)
-    for step, child in node.children():
-        annotation = fields[step].type if isinstance(step, str) and fields and not named else model
-        if child.value is None:
-            cure = (
-                "give a value, or leave the key out"
-                if isinstance(step, str)
-                else "expected a value"
-            )
-            yield Finding((*path, step), f"empty; {cure}")
-        below = section_of(annotation) if fields else None
-        yield from _spelling(child, below, (*path, step), _holds_names(annotation))
-
-
-def _holds_names(annotation: Any) -> bool:
-    return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
-
-
-MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
 ALONG = 1e-3  # rad (0.06 deg) from the Sun, up to which the side of the Sun is not told
 
 
@@ -217,13 +159,10 @@ def read_spacecraft(
     """The spacecraft in the text of a file ``name``, with ``settings``; ``aimed``: its target is
     given beside them. Raises `FaultyFile` with all faults.
     """
-    contents, root = _contents(text, name, settings, warn, aimed)
-    stated = contents.inertia
-    tensor = np.diag(np.array([stated.A, stated.A, stated.C], dtype=float))
-    if stated.tensor is not None:
-        tensor = symmetric(np.array(stated.tensor))
-    moments, axes = principal_axes(tensor)
-    inertia = Inertia(moments, axes, 0.0 if contents.wheel is None else contents.wheel.momentum)
+    facts = _contents(text, name, settings, warn, aimed)
+    contents, inertia = facts.contents, facts.inertia
+    assert inertia is not None
+    axes = inertia.axes
     omega0 = _rates(contents, inertia)
     center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
     thrusters = {
@@ -235,20 +174,17 @@ def read_spacecraft(
     if contents.attitude is not None and contents.attitude.sun_phase is not None:
         axis = attitude.on_sphere(*(contents.attitude.spin_axis or ()))
         if sunward is None or np.linalg.norm(np.cross(axis, sunward)) < ALONG:
-            problem = "the Sun lies along spin_axis, which has no side of the Sun then; give phase"
-            finding = Finding(("attitude", "sun_phase"), problem, True)
-            raise FaultyFile([_placed(finding, root, name)])
+            finding = Finding(
+                ("attitude", "sun_phase"),
+                "the Sun lies along spin_axis, which has no side of the Sun then; give phase",
+                True,
+            )
+            raise FaultyFile([_placed(finding, facts.root, name)])
+    cold, tank = _feed(contents)
     torquer = steerable if thrusters else steerable or Steerable()
     required = contents.requirement
-    asks_nothing = required is None or all(
-        bound is None
-        for bound in (
-            required.nutation,
-            required.momentum_shift,
-            required.pointing,
-            required.spin,
-        )
-    )
+    bounds = ("nutation", "momentum_shift", "pointing", "spin")
+    asks = any(getattr(required, bound, None) is not None for bound in bounds)
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
@@ -263,7 +199,7 @@ def read_spacecraft(
             for name, members in channels.items()
         ),
         steerable=steerable,
-        requirement=None if asks_nothing else _part(Requirement, required),
+        requirement=_part(Requirement, required) if asks else None,
         limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ()))
         or Limits(),
         disturbances=tuple(
@@ -277,8 +213,8 @@ def read_spacecraft(
             contents.orbit,
             lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper()),
         ),
-        cold=_given(contents.cold, _cold),
-        tank=_given(contents.tank, _tank),
+        cold=cold,
+        tank=tank,
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
         sun_sensor=_given(contents.sun_sensor, _sun_sensor, axes),
@@ -286,7 +222,7 @@ def read_spacecraft(
         loop=_given(contents.loop, _loop, axes, center),
         document=contents,
     )
-    faults = [_placed(finding, root, name) for finding in correlation_findings(spacecraft)]
+    faults = [_placed(finding, facts.root, name) for finding in correlation_findings(spacecraft)]
     if faults:
         raise FaultyFile(faults)
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
@@ -346,7 +282,7 @@ def source_of(
     return Source(read_text(Path(name)), name, settings)
 
 
-def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:
+def _part(kind: type[Part], section: Any, **others: object) -> Part | None:
     """The object that a section describes, where given: keys have the names of fields, but for
     ``others``.
     """
@@ -359,12 +295,12 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     return kind(**{**values, **others})
 
 
-def _given(section: Section | None, make: Callable[..., Part], *others: object) -> Part | None:
+def _given(section: Any, make: Callable[..., Part], *others: object) -> Part | None:
     """The object that ``make`` makes of a section, where it is given."""
     return None if section is None else make(section, *others)
 
 
-def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
+def _rates(contents: Any, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|,
     Magnus 1970 (19).
 
@@ -381,9 +317,7 @@ def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
     return np.array([*(size * way), state.spin])
 
 
-def _thruster(
-    entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSection | None, center: Vector
-) -> Thruster:
+def _thruster(entry: Any, axes: Vector, every: Any, center: Vector) -> Thruster:
     """A thruster in principal axes, about the ``center`` of mass; ``every``: valve of those without
     their own.
     """
@@ -410,28 +344,24 @@ def _thruster(
     )
 
 
-def _cold(section: keys.ColdSection) -> Cold | None:
-    from nutdamp.physics.thruster import Cold  # cold nozzles
+def _feed(contents: Any) -> tuple[Cold | None, Tank | None]:
+    """Cold nozzles, and a tank in blowdown."""
+    tank = contents.tank
+    if contents.cold is None and tank is None:
+        return None, None
+    from nutdamp.physics.thruster import Cold, Tank
 
-    return _part(Cold, section)
-
-
-def _tank(section: keys.TankSection) -> Tank | None:
-    from nutdamp.physics.thruster import Tank  # a tank in blowdown
-
-    isp, shed = section.isp, section.inertia_per_kg
-    rows = (shed.A, shed.A, shed.C) if isinstance(shed, keys.ShedSection) else tuple(shed or ())
-    return _part(
-        Tank,
-        section,
-        isp=isp and tuple(map(tuple, isp)),
-        inertia_per_kg=rows if any(rows) else None,
-    )
+    cold = _part(Cold, contents.cold)
+    if tank is None:
+        return cold, None
+    rows = tank.inertia_per_kg or ()
+    if isinstance(rows, SimpleNamespace):
+        rows = (rows.A, rows.A, rows.C)
+    isp = tank.isp and tuple(map(tuple, tank.isp))
+    return cold, _part(Tank, tank, isp=isp, inertia_per_kg=tuple(rows) if any(rows) else None)
 
 
-def _valve(
-    entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust: float | None
-) -> Valve | None:
+def _valve(entry: Any, every: Any, thrust: float | None) -> Valve | None:
     """The valve of a thruster of ``thrust`` N; None where each command gives full thrust from start
     to end.
     """
@@ -450,7 +380,7 @@ def _valve(
     return thruster.Trapezoid(*times, section.on_time_is == "effective") if any(times) else None
 
 
-def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
+def _disturbance(entry: Any, inertia: Inertia, spin: float) -> Disturbance:
     """A disturbance in principal axes; one fixed in space turns at minus the ``spin``, rad/s,
     Magnus 1970 (27).
     """
@@ -463,14 +393,12 @@ def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) 
         rate = entry.rate
     elif entry.kind == "rotating" or entry.fixed_in is not None:
         rate = -spin
-    times = vars(entry)["from"] or 0.0, entry.until or math.inf
+    times = getattr(entry, "from") or 0.0, entry.until or math.inf
     across, name = complex(torque[0], torque[1]), entry.name or ""
     return Disturbance(across, float(torque[2]), rate, name, *times)
 
 
-def _attitude(
-    section: keys.AttitudeSection, inertia: Inertia, omega0: Vector, sunward: Vector | None
-) -> Attitude:
+def _attitude(section: Any, inertia: Inertia, omega0: Vector, sunward: Vector | None) -> Attitude:
     """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and
     H in the body.
     """
@@ -493,7 +421,7 @@ def _attitude(
     return Attitude(quaternion, section.epoch, section.frame)
 
 
-def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
+def _goal(section: Any, spacecraft: Spacecraft) -> Goal:
     """The goal of a file; its tilt and azimuth count from the motion at t = 0."""
     if section is None:
         return Goal()
@@ -507,7 +435,7 @@ def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
     return Goal(spin=section.spin)
 
 
-def _sun(contents: keys.SpacecraftFile) -> Vector | None:
+def _sun(contents: Any) -> Vector | None:
     sun: tuple[float, float] | str | None = contents.sun
     if not isinstance(sun, str):
         return None if sun is None else attitude.on_sphere(*sun)
@@ -520,7 +448,7 @@ def _sun(contents: keys.SpacecraftFile) -> Vector | None:
     return attitude.frame_axes(contents.attitude.frame, days).T @ sun_direction(days)
 
 
-def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:
+def _cones(contents: Any, sunward: Vector | None) -> Iterator[Keep]:
     """The cones of the file, and that about the angular momentum which bounds the nutation on the
     way.
     """
@@ -535,7 +463,7 @@ def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Ke
         yield Keep("H", None, 0.0, contents.requirement.nutation_during)
 
 
-def _sun_sensor(section: keys.SunSensorSection, axes: Vector) -> SunSensor | None:
+def _sun_sensor(section: Any, axes: Vector) -> SunSensor | None:
     azimuth = section.azimuth
     if not np.array_equal(axes, np.eye(3)):
         first, second, _ = axes.T @ np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
@@ -543,7 +471,7 @@ def _sun_sensor(section: keys.SunSensorSection, axes: Vector) -> SunSensor | Non
     return _part(SunSensor, section, azimuth=azimuth)
 
 
-def _commands(section: keys.CommandsSection) -> Commands:
+def _commands(section: Any) -> Commands:
     width = section.width
     step = None
     if isinstance(width, list):
@@ -558,7 +486,7 @@ def _commands(section: keys.CommandsSection) -> Commands:
     return Commands(section.delay_step, section.delay_max, widths, *repeated, section.delay_is)
 
 
-def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
+def _loop(section: Any, axes: Vector, center: Vector) -> Loop | None:
     wanted = section.sensor
     along = np.array([0.0, 0.0, 1.0] if wanted.axis is None else wanted.axis)
     position = axes.T @ (np.array(wanted.position or center) - center)
@@ -572,66 +500,9 @@ def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the spacecraft file, for editors."""
-    parts: dict[str, Any] = {}
-    schema = section_schema(keys.SpacecraftFile, parts)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **schema,
+        **SPACECRAFT.definition,
         "title": "nutdamp spacecraft file",
-        "$defs": parts,
+        "$defs": definitions(SPACECRAFT),
     }
-
-
-def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, Any]:
-    """JSON Schema of a section; those that it refers to are added to ``parts``."""
-    properties = {}
-    for name, key in section.fields().items():
-        properties[name] = {
-            **_schema(key.type, parts),
-            "description": key.description,
-            "examples": key.examples,
-        }
-        if key.default is not None and key.default is not REQUIRED:
-            properties[name]["default"] = key.default
-    required = [name for name, key in section.fields().items() if key.default is REQUIRED]
-    about = " ".join((section.__doc__ or "").split())
-    schema: dict[str, Any] = {"type": "object", "title": section.__name__, "description": about}
-    schema |= {"properties": properties, "additionalProperties": False, **section.schema_extra}
-    return {**schema, "required": required} if required else schema
-
-
-def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    origin = get_origin(annotation)
-    of = get_args(annotation)
-    if origin is Annotated:
-        return _ruled_schema(of[0], of[1:], parts)
-    if origin in (Union, UnionType):
-        choices = [_schema(part, parts) for part in of if part is not NoneType]
-        return choices[0] if len(choices) == 1 else {"oneOf": choices}
-    if origin is Literal:
-        return {"type": "string", **({"enum": list(of)} if len(of) > 1 else {"const": of[0]})}
-    section = section_of(annotation)
-    if section is not None and section is annotation:
-        if section.__name__ not in parts:
-            parts[section.__name__] = section_schema(section, parts)
-        return {"$ref": f"#/$defs/{section.__name__}"}
-    if origin is list:
-        return {"type": "array", "items": _schema(of[0], parts)}
-    if origin is tuple:
-        entries = [_schema(part, parts) for part in of]
-        return {"type": "array", "prefixItems": entries, "minItems": len(of), "maxItems": len(of)}
-    if origin is dict:
-        return {"type": "object", "additionalProperties": _schema(of[1], parts)}
-    return (
-        {}
-        if annotation is Any
-        else {"type": {str: "string", int: "integer", bool: "boolean"}[annotation]}
-    )
-
-
-def _ruled_schema(
-    annotation: Any, rules: tuple[Rule, ...], parts: dict[str, Any]
-) -> dict[str, Any]:
-    if not rules:
-        return _schema(annotation, parts)
-    return rules[-1].schema(lambda: _ruled_schema(annotation, rules[:-1], parts))

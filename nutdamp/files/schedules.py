@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from nutdamp.errors import cure_of, printable
-from nutdamp.files.tabular import Row, Table
+from nutdamp.files.tabular import CellFault, Row, Table
 from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.causes import broken_limits
 from nutdamp.planning.plan import Plan
@@ -80,15 +80,19 @@ def read_blocks(
             choice.sort(key=lambda column: column != "delay_deg")
         columns[name] = next((each for each in choice if each in table.header), f"{name}_s")
         if columns[name].endswith("_counts") and commands is None:
-            problem = f"the spacecraft file has no commands, which give the steps of {name}"
-            table.fault(1, columns[name], f"{problem}; expected the column {name}_s")
+            table.fault(
+                1,
+                columns[name],
+                f"the spacecraft file has no commands, which give the steps of {name}; expected "
+                f"the column {name}_s",
+            )
     table.expect("channel", "first_sun_pulse", *columns.values(), "count")
-    blocks = {row.line: _block(row, spacecraft, columns) for row in table.rows}
-    rows = [row for row in table.rows if blocks[row.line] is not None]
-    read = tuple(block for block in blocks.values() if block is not None)
+    pairs = table.read(lambda row: _block(row, spacecraft, columns))
+    rows, read = [row for row, _ in pairs], tuple(block for _, block in pairs)
     for index, column, value, possible in misfits(spacecraft, read):
-        text = f"{column} = {value} cannot be commanded, {possible}: flown as given"
-        rows[index].warn(column, text)
+        rows[index].warn(
+            column, f"{column} = {value} cannot be commanded, {possible}: flown as given"
+        )
     total = sum(block.count for block in read)
     if total > MOST_FIRED:
         table.fault(1, "count", f"the blocks fire {total} pulses; expected at most {MOST_FIRED}")
@@ -114,19 +118,22 @@ def _expect_apart(rows: Sequence[Row], blocks: Sequence[Block], column: str) -> 
     }
     for at, (before, after) in overlaps.items():
         line, over = rows[before.at].line, before.block.delay + before.block.width
-        problem = f"Sun pulse {after.number} fires it while the pulse of line {line} is on"
-        cure = f"{over:.6g} s or more after the Sun pulse, or other Sun pulses"
-        rows[at].fault(column, f"{problem}; expected {cure}")
+        rows[at].fault(
+            column,
+            f"Sun pulse {after.number} fires it while the pulse of line {line} is on; expected "
+            f"{over:.6g} s or more after the Sun pulse, or other Sun pulses",
+        )
 
 
-def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block | None:
-    """The block of a row, with the ``columns`` of its times; None for a fault."""
-    faults = len(row.table.faults)
+def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Block:
+    """The block of a row, with the ``columns`` of its times."""
     channels = [channel.name for channel in spacecraft.channels]
     name = row["channel"]
     if name not in channels:
-        cure = cure_of(name, channels)
-        row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
+        row.fault(
+            "channel",
+            f"the spacecraft file has no channel {shown(name)}; {cure_of(name, channels)}",
+        )
     delay, width = (_time(row, spacecraft, name, column) for name, column in columns.items())
     angle = 0.0
     commands = spacecraft.commands
@@ -140,8 +147,6 @@ def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Bloc
     first = _whole(row, "first_sun_pulse", LATEST)
     count = _whole(row, "count", MOST_FIRED)
     every = _whole(row, "every", LATEST)
-    if len(row.table.faults) > faults:
-        return None
     return Block(name, first, delay or 0.0, width or 0.0, count, every, angle)
 
 
@@ -159,21 +164,23 @@ def _time(row: Row, spacecraft: Spacecraft, name: str, column: str) -> float | N
     """
     commands = spacecraft.commands
     value = row.number(column)
+    counted = column.endswith("_counts")
     if value is None:
         return None
     if value < 0.0:
         row.fault(column, f"{row[column]} is negative; expected at least 0")
-        return None
-    if not column.endswith("_counts") or commands is None:
-        return value
-    if not value.is_integer():
+    elif counted and not value.is_integer():
         row.fault(column, f"expected a whole number of steps, got {row[column]}")
-        return None
-    time = commands.time(name, value)
-    if time is None:
-        expected = f"the number of an entry of commands.width, 1 to {len(commands.widths)}"
-        row.fault(column, f"expected {expected}, got {row[column]}")
-    return time
+    elif counted and commands is not None:
+        time = commands.time(name, value)
+        if time is None:
+            row.fault(
+                column,
+                f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, "
+                f"got {row[column]}",
+            )
+        return time
+    return value
 
 
 STARTS = ("start_s", "t_s")
@@ -192,17 +199,16 @@ def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Sched
     """
     table = path if isinstance(path, Table) else Table(path, SCHEDULE_HEADER, "pulses")
     if not {*STARTS} & {*table.header}:
-        missing = f"the column is missing (or {STARTS[1]}, the centre)"
-        table.fault(1, STARTS[0], missing + table.misspelt(STARTS[0]))
+        table.fault(
+            1,
+            STARTS[0],
+            f"the column is missing (or {STARTS[1]}, the centre)" + table.misspelt(STARTS[0]),
+        )
     # With torques or impulses a pulse without channel is one of the torquer.
     steered = {*TORQUE, *IMPULSE} & {*table.header}
     table.expect("on_time_s", *(() if steered else ("channel",)))
     channels = {channel.name: channel for channel in spacecraft.channels}
-    pulses = []
-    for row in table.rows:
-        pulse = _pulse(row, spacecraft, channels)
-        if pulse is not None:
-            pulses.append((row, pulse))
+    pulses = table.read(lambda row: _pulse(row, spacecraft, channels))
     for line, other in overlapping([(row.line, pulse) for row, pulse in pulses]):
         table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
     table.check()
@@ -221,16 +227,18 @@ def read_pulses(path: str | Path | Table, spacecraft: Spacecraft) -> tuple[Sched
 def _warn_of_contradictions(row: Row, pulse: Pulse, axes: Vector) -> None:
     """Name the columns of a row that say something else than its start, on-time and channel."""
     assert pulse.torque is not None
-    values = {"t_s": pulse.t} if row.get("start_s") else {}
-    sizes = {"t_s": pulse.on_time}
-    for columns, vector in ((TORQUE, pulse.torque), (IMPULSE, pulse.impulse)):
-        values |= dict(zip(columns, (axes @ vector).tolist(), strict=True))
-        sizes |= dict.fromkeys(columns, float(np.linalg.norm(vector)))
-    for column, value in values.items():
+    follows = [("t_s", pulse.t, pulse.on_time)] if row.get("start_s") else []
+    for columns, vector in ((TORQUE, axes @ pulse.torque), (IMPULSE, axes @ pulse.impulse)):
+        size = math.hypot(*vector)
+        follows += [(column, value, size) for column, value in zip(columns, vector, strict=True)]
+    for column, value, size in follows:
         stated = row.number(column) if row.get(column) else None
-        if stated is not None and abs(stated - value) > CONTRADICTS * sizes[column]:
-            rule = "start, on-time and channel rule"
-            row.warn(column, f"{column} {row[column]} is ignored, {value:.6g} follows: {rule}")
+        if stated is not None and abs(stated - value) > CONTRADICTS * size:
+            row.warn(
+                column,
+                f"{column} {row[column]} is ignored, {value:.6g} follows: start, on-time and "
+                "channel rule",
+            )
 
 
 def read_plan(
@@ -247,7 +255,7 @@ def read_plan(
     columns = BLOCKS_HEADER if blocks else SCHEDULE_HEADER
     table = Table(path, columns, "blocks" if blocks else "pulses")
     if blocks or "first_sun_pulse" in table.header:
-        table.known = BLOCKS_HEADER
+        table.columns = BLOCKS_HEADER
         commanded, warnings = read_blocks(table, spacecraft)
         pulses = fired(spacecraft, commanded)
     else:
@@ -266,12 +274,12 @@ Channels = Mapping[str, Channel]
 
 
 def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None:
-    """The pulse of a row, with a full tank; None for a fault."""
+    """The pulse of a row, with a full tank; None for numbers that are none. Raises CellFault."""
     name = row.get("channel") or STEERABLE
     if not name.isprintable():
-        problem = f"{shown(name)} is no name of a channel"
-        row.fault("channel", f"{problem}; printable characters are expected")
-        return None
+        raise CellFault(
+            "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
+        )
     channel = channels.get(name)
     timing = _timing(row, channel)
     if timing is None:
@@ -281,30 +289,36 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
         if start is None:
             return channel_pulse(channel, t, on_time)
         return on_command(channel, start, on_time)
-    faults = len(row.table.faults)
     torque = _numbers(row, TORQUE) if on_time > 0.0 else None
     impulse = _numbers(row, IMPULSE) if torque is None else torque * on_time
     if impulse is None:
-        if len(row.table.faults) == faults:
-            row.fault("on_time_s" if channel else "channel", _missing(name, channels, on_time))
-        return None
+        raise CellFault("on_time_s" if channel else "channel", _missing(name, channels, on_time))
     principal = spacecraft.inertia.axes.T @ impulse
     push = None if on_time == 0.0 else principal / on_time
     propellant = None
     torquer = spacecraft.torquer
     if channel is not None:
-        flown = "it is flown as an ideal impulse, with unknown propellant"
-        row.warn(f"ideal {name}", f"{shown(name)} has an on-time of 0: {flown}")
+        row.warn(
+            f"ideal {name}",
+            f"{shown(name)} has an on-time of 0: it is flown as an ideal impulse, with unknown "
+            "propellant",
+        )
     elif name != STEERABLE or torquer is None:
         names = ", ".join(map(shown, channels)) or STEERABLE
-        problem = f"channel {shown(name)} is not in the spacecraft file ({names})"
-        row.warn(f"unknown {name}", f"{problem}: flown as given, propellant unknown")
+        row.warn(
+            f"unknown {name}",
+            f"channel {shown(name)} is not in the spacecraft file ({names}): flown as given, "
+            "propellant unknown",
+        )
     else:
         size = float(np.linalg.norm(principal))
         rated = None if torquer.torque is None else torquer.torque * on_time
         if rated and abs(size - rated) > AGREES * rated:
-            problem = f"{size / on_time:g} N m is not the torque of the steerable torquer"
-            row.warn("steerable torque", f"{problem}, {torquer.torque:g} N m: flown as given")
+            row.warn(
+                "steerable torque",
+                f"{size / on_time:g} N m is not the torque of the steerable torquer, "
+                f"{torquer.torque:g} N m: flown as given",
+            )
         rate = torquer.propellant_per_impulse
         propellant = None if rate is None else rate * size
     return Pulse(t, on_time, name, principal, push, None, propellant)
@@ -314,36 +328,43 @@ def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | No
     """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
     column = next((column for column in STARTS if row.get(column)), None)
     if column is None:
-        row.fault(STARTS[0], "the time is missing")
-        return None
+        raise CellFault(STARTS[0], "the time is missing")
     time, on_time = row.number(column), row.number("on_time_s")
     if time is None or on_time is None:
         return None
     if on_time < 0.0:
-        cure = "0 s or more is expected (0 for an ideal impulse)"
-        row.fault("on_time_s", f"{on_time:g} s is negative; {cure}")
-        return None
+        raise CellFault(
+            "on_time_s",
+            f"{on_time:g} s is negative; 0 s or more is expected (0 for an ideal impulse)",
+        )
     centre = 0.5 * on_time
     valve = None if channel is None or on_time == 0.0 else channel.valve
     if channel is not None and valve is not None:
         shortest, longest = valve.known
         if not shortest <= on_time <= longest:
-            rows = f"the impulse_bit of {shown(channel.name)}, {shortest:g} s to {longest:g} s"
-            row.fault("on_time_s", f"{on_time:g} s is outside {rows}")
+            row.fault(
+                "on_time_s",
+                f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {shortest:g} "
+                f"s to {longest:g} s",
+            )
         thrust = valve.thrust(on_time)
         if not thrust.ramps:
-            problem = f"{on_time:g} s is too short for the valve of {shown(channel.name)}"
-            row.warn(f"closed {channel.name}", f"{problem}: it does not open")
+            row.warn(
+                f"closed {channel.name}",
+                f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not "
+                "open",
+            )
         centre = thrust.centroid
     start = time if column == STARTS[0] else time - centre
     if start < -1e-9:  # s; an earlier start is no rounding of 0
-        row.fault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
-        return None
+        raise CellFault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
     t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
     if not Pulse(t, on_time, "", np.zeros(3)).resolved:
-        apart = f"where times are {math.ulp(t + 0.5 * on_time):.2g} s apart"
-        row.fault("on_time_s", f"{on_time:g} s is too short at {t:g} s, {apart}")
-        return None
+        raise CellFault(
+            "on_time_s",
+            f"{on_time:g} s is too short at {t:g} s, where times are "
+            f"{math.ulp(t + 0.5 * on_time):.2g} s apart",
+        )
     begins = max(start, 0.0) if column == STARTS[0] else t - centre
     return t, on_time, None if valve is None else begins
 
@@ -353,12 +374,13 @@ def _missing(name: str, channels: Channels, on_time: float) -> str:
     impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
     columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
     if name in channels:
-        nothing = f"with an on-time of 0 {shown(name)} fires nothing"
-        return f"{nothing}, unless {columns} give an ideal impulse"
+        return (
+            f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal "
+            "impulse"
+        )
     if name == STEERABLE:
         return f"a steered pulse needs {columns}"
-    cure = cure_of(name, channels)
-    return f"{shown(name)}, not in the spacecraft file ({cure}), needs {columns}"
+    return f"{shown(name)}, not in the spacecraft file ({cure_of(name, channels)}), needs {columns}"
 
 
 def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:

@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,15 +185,27 @@ def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
     return structured(HEADER, [*table.T, track.pulse])
 
 
+def number_rows(columns: Iterable[NDArray[Any]]) -> bytes:
+    """Rows of CSV of columns (n,) of numbers, which read back as they were; a column of NaN is
+    empty.
+    """
+    texts = (
+        [""] * len(column) if math.isnan(column[0]) else map(repr, column.tolist())
+        for column in columns
+    )
+    return "".join(f"{','.join(row)}\r\n" for row in zip(*texts, strict=True)).encode()
+
+
 def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) -> None:
     """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
     stream.write(f"{','.join(HEADER)}\r\n".encode())
     for piece in pieces:
         if len(piece.t):
-            # Finite numbers each by their repr: the shortest text that reads back the same.
-            rows = repr(track_array(piece, inertia).tolist())[2:-2]
-            stream.write(rows.replace("), (", "\r\n").replace(", ", ",").encode() + b"\r\n")
+            rows = track_array(piece, inertia)
+            stream.write(number_rows(rows[name] for name in HEADER))
 
+
+Value = TypeVar("Value")
 
 LARGEST = 1e15  # larger magnitudes are nothing of a spacecraft, and would overflow later
 MOST_BYTES = 32 << 20  # size of a file, many times more than its most rows take
@@ -230,6 +242,10 @@ class Row(dict[str, str]):
         self.table.warnings.setdefault(subject, []).append((self.line, text))
 
 
+class CellFault(Exception):
+    """A fault in a column of a row, in words, after which the row tells no more."""
+
+
 class Table:
     """The ``header`` of a file (names of columns) and, from `expect` on, ``rows``; raises
     CannotRead, FaultyFile.
@@ -238,7 +254,7 @@ class Table:
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
         """Table with ``columns`` that are known; ``what`` is the word for a row, for messages."""
         self.name = str(path)
-        self.known = columns
+        self.columns = columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}
         text = decode(read_limited(self.name, MOST_BYTES), self.name)
@@ -270,13 +286,28 @@ class Table:
             self.fault(1, column, "the column is given twice")
         self.check()
         for column in self.header:
-            if column not in self.known:
+            if column not in self.columns:
                 self.warnings[column] = [(1, f"the column {shown(column)} is not known: ignored")]
         for line, cells in self._lines:
             if len(cells) == len(self.header):
                 self.rows.append(Row(self, line, cells))
             else:
                 self.fault(line, "", f"{len(cells)} values under {len(self.header)} columns")
+
+    def read(self, read_row: Callable[[Row], Value | None]) -> list[tuple[Row, Value]]:
+        """The rows without faults and what is read of each; the faults of the others are kept."""
+        pairs = []
+        for row in self.rows:
+            faults = len(self.faults)
+            try:
+                value = read_row(row)
+            except CellFault as wrong:
+                if len(self.faults) == faults:  # else it follows from those
+                    row.fault(*wrong.args)
+                continue
+            if value is not None and len(self.faults) == faults:
+                pairs.append((row, value))
+        return pairs
 
     def check(self) -> None:
         """Raise FaultyFile with the faults so far: of a column the first `MOST_FAULTS`, and how
@@ -297,7 +328,7 @@ class Table:
 
     def misspelt(self, column: str) -> str:
         """The column of the header that may be meant to be a missing one, in words."""
-        close = nearest(column, [entry for entry in self.header if entry not in self.known])
+        close = nearest(column, [entry for entry in self.header if entry not in self.columns])
         return "" if close is None else f"; rename {shown(close)} if that is meant"
 
     def fault(self, line: int, where: str, problem: str) -> None:

@@ -170,8 +170,9 @@ def _read_samples(
     if TOWARDS[0] in header and CROSSED[0] not in header:
         table.fault(1, CROSSED[0], f"the column is missing beside {TOWARDS[0]}")
     if CROSSED[0] in header and TOWARDS[0] not in header and spacecraft.sun is None:
-        problem = "no direction: that of the Sun needs the key sun in the spacecraft file"
-        table.fault(1, CROSSED[0], problem)
+        table.fault(
+            1, CROSSED[0], "no direction: that of the Sun needs the key sun in the spacecraft file"
+        )
     table.expect()
     times, columns = _samples(table, spacecraft)
     table.check()
@@ -219,12 +220,15 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
             row.fault(column, str(reason))
             continue
         if time is not None and moments and time <= moments[-1]:
-            text = f"{row[column]} is not after the sample before, at {moments[-1]:.9g} s"
-            row.fault(column, text + (JUMPS if TRACK[-1] in table.header else ""))
+            row.fault(
+                column,
+                f"{row[column]} is not after the sample before, at {moments[-1]:.9g} s"
+                + (JUMPS if TRACK[-1] in table.header else ""),
+            )
         moments += [] if time is None else [time]
     table.check()
     columns = {}
-    for name in (name for name in MEASURED if name in table.known and name in table.header):
+    for name in (name for name in MEASURED if name in table.columns and name in table.header):
         numbers = (
             row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows
         )
@@ -319,8 +323,12 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     meant += [(size, f"is the spin of the file in {unit}") for unit, size in units if size != 1.0]
     words = next((words for size, words in meant if abs(ratio / size - 1.0) < SAME), None)
     if words is not None:
-        seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
-        table.fault(1, column, f"{seen}: {words}?")
+        table.fault(
+            1,
+            column,
+            f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s): "
+            f"{words}?",
+        )
 
 
 def _sun_column(table: Table, times: Vector, values: Vector | None) -> tuple[Vector, float]:

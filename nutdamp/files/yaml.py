@@ -22,21 +22,23 @@ from yaml.reader import Reader, ReaderError
 from yaml.scanner import Scanner
 
 from nutdamp.errors import CannotRead, Fault, FaultyFile
-from nutdamp.files.fields import KeyPath as KeyPath
 from nutdamp.units import shown
+
+KeyPath = tuple[str | int, ...]
+"""Keys and list positions that lead from the root to a value."""
 
 STDIN = "-"  # file name that means standard input
 
 
-def read_bytes(path: str, most: int = -1) -> bytes:
-    """Contents of a file, at most ``most`` bytes of it; ``-`` is standard input.
+def read_bytes(path: str, limit: int = -1) -> bytes:
+    """Contents of a file, at most ``limit`` bytes of it; ``-`` is standard input.
     Raises CannotRead.
     """
     try:
         if path == STDIN:
             if sys.stdin is None:
                 raise CannotRead(path, "there is no standard input")
-            return sys.stdin.buffer.read(most)
+            return sys.stdin.buffer.read(limit)
         mode = Path(path).stat().st_mode
         problem = "it is a device; expected a file, a pipe or -"
         if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
@@ -44,7 +46,7 @@ def read_bytes(path: str, most: int = -1) -> bytes:
         with Path(path).open("rb") as stream:
             if stat.S_ISCHR(mode) and not stream.isatty():  # reading may never end
                 raise CannotRead(path, problem)
-            return stream.read(most)
+            return stream.read(limit)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise CannotRead(path, reason.lower()) from error
@@ -53,13 +55,13 @@ def read_bytes(path: str, most: int = -1) -> bytes:
 MAX_BYTES = 1 << 20  # of a spacecraft file
 
 
-def read_limited(path: str, most: int = MAX_BYTES) -> bytes:
-    """Contents of a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is
+def read_limited(path: str, limit: int = MAX_BYTES) -> bytes:
+    """Contents of a file of at most ``limit`` bytes; raises CannotRead, or FaultyFile where it is
     larger.
     """
-    data = read_bytes(path, most + 1)
-    if len(data) > most:
-        raise FaultyFile([Fault(path, 0, 0, "", f"too large: more than {most >> 20} MiB")])
+    data = read_bytes(path, limit + 1)
+    if len(data) > limit:
+        raise FaultyFile([Fault(path, 0, 0, "", f"too large: more than {limit >> 20} MiB")])
     return data
 
 
@@ -68,13 +70,14 @@ MAX_DEPTH = 32
 
 
 class Place(NamedTuple):
-    """Line and column of a value, both from 1, 0 where there are none; or the name of a ``setting``
-    beside the file.
+    """Line and column of a value, both from 1, 0 where there are none, and its ``offset`` in the
+    text; or the name of a ``setting`` beside the file.
     """
 
     line: int = 0
     column: int = 0
     setting: str = ""
+    offset: int = 0
 
     def __str__(self) -> str:
         return self.setting or f"line {self.line}, column {self.column}"
@@ -89,12 +92,16 @@ Scalar = str | int | float | bool | None
 
 @dataclass(slots=True)
 class Node:
-    """A value and where it is; ``keys`` holds the places of a mapping's keys."""
+    """A value and where it is, up to the offset ``end`` of the text; ``keys`` holds the places of a
+    mapping's keys, ``flow`` is True of what stands in brackets or braces.
+    """
 
     value: Scalar | dict[str, Node] | list[Node]
     place: Place
     keys: dict[str, Place] = field(default_factory=dict)
     size: int = 1
+    end: int = 0
+    flow: bool = False
 
     def get(self, *path: str | int) -> Node | None:
         """The node at ``path`` below this one; None where there is none."""
@@ -189,8 +196,9 @@ def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
         "a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft"
     )
     if not isinstance(root.value, dict):
-        problem = f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
-        raise builder.fatal(root.place, problem)
+        raise builder.fatal(
+            root.place, f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
+        )
     return root, builder.faults
 
 
@@ -296,7 +304,9 @@ class _Builder:
         if event.anchor is not None:
             self.anchors[event.anchor] = None
         if isinstance(event, yaml.ScalarEvent):
-            node = Node(self.scalar(event, path), place)
+            # the text of a block ends in a line break
+            end = _at(event.end_mark).offset - (event.style in ("|", ">"))
+            node = Node(self.scalar(event, path), place, end=end)
         elif isinstance(event, yaml.SequenceStartEvent):
             node = self.sequence(event, path)
         else:
@@ -328,7 +338,7 @@ class _Builder:
         entries: list[Node] = []
         while not isinstance(entry := self.next(), yaml.SequenceEndEvent):
             entries.append(self.node(entry, (*path, len(entries))))
-        return Node(entries, _at(event.start_mark), size=1 + sum(entry.size for entry in entries))
+        return self.collection(entries, entries, event, entry)
 
     def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
         """A mapping, up to its end event;
@@ -348,13 +358,31 @@ class _Builder:
                 self.anchors[key.anchor] = Node(text, place)
             value = self.node(self.next(), (*path, text))
             if text in values:
-                problem = f"duplicate key; already given at {keys[text]}; remove one of them"
-                self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
+                self.faults.append(
+                    place.fault(
+                        self.name,
+                        dotted((*path, text)),
+                        f"duplicate key; already given at {keys[text]}; remove one of them",
+                    )
+                )
             else:
                 values[text], keys[text] = value, place
-        return Node(
-            values, _at(event.start_mark), keys, 1 + sum(node.size for node in values.values())
-        )
+        node = self.collection(values, [*values.values()], event, key)
+        node.keys = keys
+        return node
+
+    def collection(
+        self,
+        value: dict[str, Node] | list[Node],
+        entries: list[Node],
+        begin: yaml.CollectionStartEvent,
+        end: yaml.Event,
+    ) -> Node:
+        """A list or mapping between two events; a block ends with its last entry."""
+        size = 1 + sum(entry.size for entry in entries)
+        flow = bool(begin.flow_style) or not entries
+        last = _at(end.end_mark).offset if flow else entries[-1].end
+        return Node(value, _at(begin.start_mark), size=size, end=last, flow=flow)
 
     def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
         """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag
@@ -462,7 +490,7 @@ _SYNTAX = (
 
 def _at(mark: Any) -> Place:
     """Place of a mark, which PyYAML counts from 0; (0, 0) where it gave none."""
-    return Place() if mark is None else Place(mark.line + 1, mark.column + 1)
+    return Place() if mark is None else Place(mark.line + 1, mark.column + 1, offset=mark.index)
 
 
 def _place(text: str, position: int) -> Place:

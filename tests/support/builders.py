@@ -1,5 +1,6 @@
 """Spacecraft in one line each, in principal axes and SI, and a guard against endless loops."""
 
+import json
 import math
 import sys
 from collections.abc import Iterable, Iterator
@@ -12,8 +13,8 @@ import numpy as np
 from support import reference
 
 from nutdamp.common import results
-from nutdamp.files.fields import Problems
-from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.facts import Facts
+from nutdamp.files.yaml import read_tree
 from nutdamp.flight.propagation import Residual
 from nutdamp.physics import attitude
 from nutdamp.physics.thruster import Measured, Trapezoid
@@ -308,10 +309,9 @@ def documented(spacecraft: Spacecraft) -> Spacecraft:
         file["dissipation"] = {"time_constant": spacecraft.dissipation, "nutation": grows}
     if spacecraft.center_of_mass_per_kg is not None:
         file["center_of_mass_per_kg"] = (axes @ spacecraft.center_of_mass_per_kg).tolist()
-    problems: Problems = []
-    document = SpacecraftFile.read(file, problems)
-    assert not problems, problems
-    return replace(spacecraft, document=document)
+    facts = Facts(read_tree(json.dumps(file), "built")[0])
+    assert all(finding.problem.startswith("empty") for finding in facts.findings)
+    return replace(spacecraft, document=facts.contents)
 
 
 def _values(part: object, names: str) -> dict[str, Any]:

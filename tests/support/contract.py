@@ -60,6 +60,18 @@ def check_faults(
     check_text(key, "\n".join(lines))
 
 
+def at(value: Any, path: str) -> Any:
+    """The part of an object at ``path``, such as ``channels.0.name``; arrays as lists."""
+    for step in path.split("."):
+        value = value[int(step)] if step.isdigit() else getattr(value, step)
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def check_parts(value: Any, expected: Mapping[str, Any]) -> None:
+    """Fails where one of the parts of an object, by their paths, is not as expected."""
+    assert {path: at(value, path) for path in expected} == expected
+
+
 ORBIT = (
     "orbit={position: [7000 km, -12 km, 3.5 km], "
     "velocity: [0.1 km/s, 7400, 120 m/s], center: earth}"

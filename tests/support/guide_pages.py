@@ -2,13 +2,12 @@
 
 import re
 from collections.abc import Iterator
-from typing import Any, Literal, NamedTuple, get_args, get_origin
+from typing import NamedTuple
 
 from support.builders import present
 
-from nutdamp.errors import listed
 from nutdamp.files import fields
-from nutdamp.files.keys import QUANTITIES, SpacecraftFile, ToleranceSection, unit_kinds
+from nutdamp.files.keys import SPACECRAFT
 from nutdamp.units import KINDS, Kind
 from nutdamp.views.guide import FOLDER
 
@@ -22,7 +21,7 @@ class KeyGuide(NamedTuple):
 
     path: str
     field: fields.Key
-    section: type[fields.Section] | None
+    section: fields.ValueKind | None
 
     @property
     def parent(self) -> str:
@@ -40,13 +39,11 @@ class KeyGuide(NamedTuple):
         unit = ""
         default = ""
         example = next(iter(self.field.examples), None)
-        if self.section is not None and issubclass(self.section, ToleranceSection):
-            names = [
-                unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors
-            ]
-            unit = f"unit {listed([*dict.fromkeys(names)], 'or')}"
-        elif self.section is None:
-            unit = _what(self.field)
+        if self.section is None:
+            forms = (part.form for part in self.field.kind.within() if part.form not in PLAIN)
+            unit = self.field.kind.form or next(forms, "")
+        else:
+            unit = self.section.form
         value = self.field.default
         if value is fields.REQUIRED:
             default = "required"
@@ -57,40 +54,17 @@ class KeyGuide(NamedTuple):
         return f"{self.field.description} {told[:1].upper()}{told[1:]}"
 
 
-def keys(model: type[fields.Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
+PLAIN = ("", "a text", "a whole number")
+"""Forms that are not told of the entries of a list."""
+
+
+def keys(model: fields.ValueKind = SPACECRAFT, prefix: str = "") -> Iterator[KeyGuide]:
     """All keys of the file, each before those below it."""
-    for name, field in model.fields().items():
-        section = fields.section_of(field.type)
+    for name, field in model.keys.items():
+        section = next((part for part in field.kind.within() if part.keys), None)
         yield KeyGuide(f"{prefix}{name}", field, section)
         if section is not None:
             yield from keys(section, f"{prefix}{name}.")
-
-
-def _what(field: fields.Key) -> str:
-    parts = list(_within(field.type))
-    quantity = next((part for part in parts if isinstance(part, fields.Quantity)), None)
-    if quantity is not None:
-        factors = KINDS[quantity.kind].factors
-        return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"
-    choices = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
-    plain = next(
-        (part for part in parts if get_origin(part) in (list, dict) or isinstance(part, type)), None
-    )
-    return (
-        listed(choices, "or")
-        if choices
-        else "a whole number"
-        if plain is int
-        else "a text"
-        if plain is str
-        else ""
-    )
-
-
-def _within(annotation: Any) -> Iterator[Any]:
-    yield annotation
-    for part in get_args(annotation):
-        yield from _within(part)
 
 
 def flow(value: object) -> str:
@@ -107,10 +81,10 @@ def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[str]:
     if key.section is None:
         return
     children = [entry for entry in every if entry.parent == key.path]
-    about = " ".join((key.section.__doc__ or "").split())
+    about = key.section.definition["description"]
     yield f"## {key.path}\n\n{about}\n\n{_listed(children)}"
     below = [child for child in children if child.section is not None]
-    if below and all(issubclass(present(child.section), ToleranceSection) for child in below):
+    if below and all(present(child.section).form for child in below):
         alike = [entry for entry in every if entry.parent == below[0].path]
         names = ", ".join(child.name for child in below)
         yield f"## {key.path}: each of {names}\n\n{_listed(alike)}"

@@ -117,8 +117,11 @@ class Contents(NamedTuple):
             rates = np.nan_to_num(rates)
         epoch = self.epoch.plus(float(self.times[index]))
         if len(self.times) > 1:
-            late = f"{self.times[index] - self.times[0]:.6g} s after the first"
-            remarks = (f"record used: {late}, at {epoch.text}Z", *remarks)
+            remarks = (
+                f"record used: {self.times[index] - self.times[0]:.6g} s after the first, at "
+                f"{epoch.text}Z",
+                *remarks,
+            )
         return self._replace(
             epoch=epoch,
             times=np.zeros(1),
@@ -219,8 +222,10 @@ class MessageReader:
         if fixed and not in_body:
             raise ValueError(f"{name!r} is not a body frame; expected SC_BODY_1")
         if frame is None:
-            expected = f"SC_BODY_1 or one of {', '.join(FRAME_NAMES)}"
-            raise ValueError(f"{name!r} is no frame known here; expected {expected}")
+            raise ValueError(
+                f"{name!r} is no frame known here; expected SC_BODY_1 or one of "
+                f"{', '.join(FRAME_NAMES)}"
+            )
         shared = self.frames.setdefault(in_body, frame)
         if AXES.get(shared, shared) != AXES.get(frame, frame):
             raise ValueError(f"{name!r} here, {shared!r} in another block; expected one frame")
@@ -293,8 +298,11 @@ class Fields:
             parts = np.column_stack([columns[name] for name in ("QC", "Q1", "Q2", "Q3")])
             lengths = np.linalg.norm(parts, axis=1)
             for index in np.flatnonzero(np.abs(lengths - 1.0) > UNIT).tolist():
-                problem = f"the quaternion has length {lengths[index]:.6g}; expected 1"
-                self.reader.fault(lines[index], "Q1", problem)
+                self.reader.fault(
+                    lines[index],
+                    "Q1",
+                    f"the quaternion has length {lengths[index]:.6g}; expected 1",
+                )
             turn = parts / np.where(lengths > 0.0, lengths, 1.0)[:, None]
         elif "ANGLE_1" in columns:
             if "EULER_ROT_SEQ" not in self.lines:
@@ -303,8 +311,10 @@ class Fields:
             turn = euler(self.values.get("EULER_ROT_SEQ", "ZXZ"), *angles)
         else:
             if not self.forward:
-                problem = "this block leads from the inertial frame to the body"
-                self.fault("REF_FRAME_A", f"the body comes first; {problem}")
+                self.fault(
+                    "REF_FRAME_A",
+                    "the body comes first; this block leads from the inertial frame to the body",
+                )
             alpha, delta, angle = (
                 np.radians(columns[name]) for name in names(message.SPIN_AXIS)[:3]
             )
@@ -389,9 +399,11 @@ def read_message(path: str) -> Contents:
         return _stk(reader)
     word, _, version = (part.strip() for part in first.partition("="))
     if word not in FORMS or version != VERSION:
-        expected = f"{listed([*FORMS], 'or')} = {VERSION}, or stk.v.11.0 (.a)"
         reader.fault(
-            line, "", f"{first[:40]!r} does not begin a known message; expected {expected}"
+            line,
+            "",
+            f"{first[:40]!r} does not begin a known message; expected {listed([*FORMS], 'or')} = "
+            f"{VERSION}, or stk.v.11.0 (.a)",
         )
         raise FaultyFile([*reader.faults.values()])
     form = FORMS[word]
@@ -422,8 +434,7 @@ def _sections(reader: MessageReader, form: Form) -> list[BlockLines]:
                 reader.fault(line, content, f"unknown block; known are {starts}")
                 continue
             if edge[1] in reader.lines and not form.blocks[edge[1]].repeated:
-                problem = "a second block of this kind; remove one of the two"
-                reader.fault(line, edge[1], problem)
+                reader.fault(line, edge[1], "a second block of this kind; remove one of the two")
             if form.blocks[edge[1]].skipped:
                 reader.remarks.append(f"{edge[1]} blocks are not read")
             sections.append(within)
@@ -457,8 +468,10 @@ def _take_rows(
         where = section.name
         try:
             if len(cells) != len(keywords):
-                expected = f"a time and {', '.join(names(keywords))}"
-                raise ValueError(f"{len(cells)} numbers behind the time; expected {expected}")
+                raise ValueError(
+                    f"{len(cells)} numbers behind the time; expected a time and "
+                    f"{', '.join(names(keywords))}"
+                )
             values = []
             for keyword, cell in zip(keywords, cells, strict=True):
                 where = keyword.name
@@ -536,23 +549,27 @@ def _apm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
             case "ANGVEL":
                 rates = block.rates(columns, quaternion)
                 if np.isnan(rates).any():
-                    problem = "rates in an inertial frame need the attitude of another block"
-                    block.fault("ANGVEL_FRAME", problem)
+                    block.fault(
+                        "ANGVEL_FRAME",
+                        "rates in an inertial frame need the attitude of another block",
+                    )
             case "SPIN":
                 nutating, turning = (
                     block.columns(keywords) for keywords in (message.NUTATION, message.MOMENTUM)
                 )
                 if nutating and turning:
-                    problem = "given together with NUTATION; keep one set of the two"
-                    block.fault("MOMENTUM_ALPHA", problem)
+                    block.fault(
+                        "MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two"
+                    )
                 columns |= nutating or turning
                 turn = block.attitudes(columns, [])
                 spun = np.nan_to_num(spin_rates(columns, turn))
                 where = f"line {section.line}: SPIN gives"
                 # The product of quaternions is the cosine of half the angle between them.
                 if abs(float(np.vdot(quaternion, turn))) < 1.0 - AGREES**2 / 8.0:
-                    other = "a different attitude from the blocks before it, which count"
-                    reader.remarks.append(f"{where} {other}")
+                    reader.remarks.append(
+                        f"{where} a different attitude from the blocks before it, which count"
+                    )
                 if np.linalg.norm(rates - spun) > AGREES * np.linalg.norm(rates):
                     reader.remarks.append(f"{where} different rates from ANGVEL, which counts")
                 if np.isnan(rates).any():
@@ -567,16 +584,17 @@ def _apm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
                     for key in ("EPOCH_START", "DURATION", "DELTA_MASS")
                 )
                 if not torque.any():
-                    problem = "the torque is zero; expected a component other than 0"
-                    block.fault("MAN_TOR_X", problem)
+                    block.fault(
+                        "MAN_TOR_X", "the torque is zero; expected a component other than 0"
+                    )
                 if epoch is not None and start is not None and start < epoch:
-                    problem = "begins before EPOCH, the start of the motion"
-                    block.fault("MAN_EPOCH_START", problem)
+                    block.fault("MAN_EPOCH_START", "begins before EPOCH, the start of the motion")
                 elif epoch is not None and start is not None:
                     manoeuvres.append(Manoeuvre(start.since(epoch), duration or 0.0, torque, used))
     if np.isnan(rates).any() and not reader.faults:
-        problem = "missing; without an ANGVEL or a SPIN block the motion is not known"
-        reader.fault(1, "ANGVEL", problem)
+        reader.fault(
+            1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known"
+        )
     if np.isnan(quaternion).any():
         reader.remarks.append("the message gives no attitude: frame and epoch are left out")
     reader.epochs += [] if epoch is None else [epoch]
@@ -617,14 +635,16 @@ def _acm(reader: MessageReader, about: Fields, sections: list[BlockLines]) -> Co
             tensor = tensor_of(block.columns(message.INERTIA))
             mass = block.values.get("WET_MASS")
             if "CP" in block.values:
-                unused = "CP is the center of pressure, from the center of mass: not used"
-                reader.remarks.append(unused)
+                reader.remarks.append(
+                    "CP is the center of pressure, from the center of mass: not used"
+                )
         elif "ATT_TYPE" in block.values:
             rates = message.ACM_RATES[block.values.get("RATE_TYPE", "NONE")]
             keywords = (*message.ACM_ATTITUDES[block.values["ATT_TYPE"]], *rates)
             if block.values.get("NUMBER_STATES", len(keywords)) != len(keywords):
-                needed = f"{len(keywords)}: {', '.join(names(keywords))}"
-                block.fault("NUMBER_STATES", f"expected {needed}")
+                block.fault(
+                    "NUMBER_STATES", f"expected {len(keywords)}: {', '.join(names(keywords))}"
+                )
             _take_rows(reader, block, section, keywords, zero)
     reader.epochs += [] if zero is None or reader.epochs else [zero]
     return _contents(reader, about, tensor, mass)
@@ -647,8 +667,11 @@ def _stk(reader: MessageReader) -> Contents:
             keywords.entries.append((line, word, " ".join(rest), None))
     block = Fields(reader, keywords, message.STK_KEYWORDS)
     if data.name not in message.STK_ROWS:
-        expected = f"expected a line {listed(list(message.STK_ROWS), 'or')}"
-        reader.fault(data.line, data.name, f"no columns that are read; {expected}")
+        reader.fault(
+            data.line,
+            data.name,
+            f"no columns that are read; expected a line {listed(list(message.STK_ROWS), 'or')}",
+        )
         raise FaultyFile([*reader.faults.values()])
     if block.values.get("NumberOfAttitudePoints", len(data.rows)) != len(data.rows):
         block.fault("NumberOfAttitudePoints", f"there are {len(data.rows)}")

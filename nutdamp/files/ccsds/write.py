@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from itertools import groupby
-from operator import attrgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -61,23 +60,13 @@ from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
 
-class MessageEntry(NamedTuple):
-    """A keyword (none in data lines) with its value, as texts.
-
-    ``tag`` wraps it in XML besides that of the block.
+class MessageBlock(NamedTuple):
+    """Keywords that belong together, with their values as texts; ``name`` is that of the layout,
+    empty outside of blocks.
     """
 
-    keyword: str
-    value: str
-    unit: str | None = None
-    tag: str = ""
-
-
-class MessageBlock(NamedTuple):
-    """Keywords that belong together; ``name`` is that of the layout, empty outside of blocks."""
-
     name: str
-    entries: tuple[MessageEntry, ...]
+    entries: tuple[tuple[Keyword, str], ...]
     comments: tuple[str, ...] = ()
 
 
@@ -113,12 +102,7 @@ def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: s
     unit of the table.
     """
     entries = tuple(
-        MessageEntry(
-            keyword.name,
-            value if isinstance(value, str) else number(value),
-            keyword.unit,
-            keyword.tag,
-        )
+        (keyword, value if isinstance(value, str) else number(value))
         for keyword, value in zip(keywords, values, strict=False)
         if value is not None
     )
@@ -190,12 +174,11 @@ def to_xml(message: Message) -> str:
 def _fill(place: Element, block: MessageBlock) -> None:
     for comment in block.comments:
         SubElement(place, "COMMENT").text = comment
-    for tag, group in groupby(block.entries, attrgetter("tag")):
+    for tag, group in groupby(block.entries, lambda entry: entry[0].tag):
         parent = SubElement(place, tag) if tag else place
-        for entry in group:
-            SubElement(
-                parent, entry.keyword, {"units": entry.unit} if entry.unit else {}
-            ).text = entry.value
+        for keyword, value in group:
+            units = {"units": keyword.unit} if keyword.unit else {}
+            SubElement(parent, keyword.name, units).text = value
 
 
 def to_kvn(message: Message) -> str:
@@ -225,12 +208,12 @@ def to_kvn(message: Message) -> str:
 
 
 def _kvn_lines(block: MessageBlock) -> list[str]:
-    width = max((len(entry.keyword) for entry in block.entries), default=0)
+    width = max((len(keyword.name) for keyword, _ in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
         *(
-            f"{word:<{width}} = {value}" + (f" [{unit}]" if unit else "")
-            for word, value, unit, *_ in block.entries
+            f"{keyword.name:<{width}} = {value}" + (f" [{keyword.unit}]" if keyword.unit else "")
+            for keyword, value in block.entries
         ),
     ]
 
@@ -346,8 +329,13 @@ def _block(name: str, values: Values, *comments: str) -> MessageBlock:
 def _header(plan: Plan, created: Epoch) -> MessageBlock:
     moment = created.text.partition(".")[0]
     values = [None, moment, ORIGINATOR, label(f"{plan.scheme}-{moment}")]
-    about = f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}"
-    return block("", message.HEADER, values, about, f"status: {plan.verdict.status.value}")
+    return block(
+        "",
+        message.HEADER,
+        values,
+        f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}",
+        f"status: {plan.verdict.status.value}",
+    )
 
 
 def _identity(spacecraft: Spacecraft) -> tuple[str, str]:
@@ -359,8 +347,8 @@ def _unsaid(spacecraft: Spacecraft) -> list[str]:
     per_kg = shed(spacecraft)
     of_file = "of the spacecraft file"
     spins = spinning(spacecraft.inertia)
-    momentum = f"{wheel:.9g} N*m*s along principal axis 3"
     values = ", ".join(f"{moment:.9g}" for moment in (() if per_kg is None else per_kg))
+    momentum = f"{wheel:.9g} N*m*s along principal axis 3"
     remarks = {
         f"The disturbances {of_file} are not in this message.": spacecraft.disturbances,
         f"The energy dissipation {of_file} is not in this message.": spacecraft.dissipation
@@ -371,8 +359,8 @@ def _unsaid(spacecraft: Spacecraft) -> list[str]:
             "used."
         ): values,
         (
-            "No SPIN block: the body is not symmetric about its third axis, "
-            "as the model of that block is."
+            "No SPIN block: the body is not symmetric about its third axis, as the model of that "
+            "block is."
         ): not spins,
     }
     return [remark for remark, holds in remarks.items() if holds]
@@ -385,19 +373,23 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[Message
         mass = None if pulse.propellant is None else -pulse.propellant
         if name == "MAN":
             if pulse.torque is None or pulse.on_time == 0.0:
-                cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
-                impulse = f"pulse {place} is an ideal impulse without a duration"
-                raise BadRequest(f"{impulse}, which an APM cannot hold; {cure}")
+                raise BadRequest(
+                    f"pulse {place} is an ideal impulse without a duration, which an APM cannot "
+                    "hold; "
+                    "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
+                )
             values = [*timing, BODY_FRAME, *plan.spacecraft.inertia.in_file(pulse.torque), mass]
         else:
             if pulse.force is None:
-                change = f"the velocity change by pulse {place} ({pulse.channel})"
                 raise BadRequest(
-                    f"{change} is not known; give the thrusters position, direction and force"
+                    f"the velocity change by pulse {place} ({pulse.channel}) is not known; give "
+                    "the thrusters position, direction and force"
                 )
             if pulse.propellant is None:
-                used = f"the propellant of pulse {place} ({pulse.channel})"
-                raise BadRequest(f"{used} is not known, which an OPM needs; give the thrusters isp")
+                raise BadRequest(
+                    f"the propellant of pulse {place} ({pulse.channel}) is not known, which an OPM "
+                    "needs; give the thrusters isp"
+                )
             assert plan.spacecraft.mass is not None
             gained = momentum_gained(replace(plan._flight, schedule=Schedule((pulse,))))  # inertial
             values = [
@@ -412,8 +404,10 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[Message
             comments.append(
                 f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on."
             )
-            thrust = f"{pulse.on_time:.9g} s at the torque given."
-            comments.append(f"Start and duration below are those of the thrust: {thrust}")
+            comments.append(
+                f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the "
+                "torque given."
+            )
         yield _block(name, values, *comments)
 
 
@@ -440,8 +434,8 @@ def aem(
 
 
 ALONE = (
-    "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, "
-    "no nutation."
+    "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, no "
+    "nutation."
 )
 """Comment on records of the spin alone."""
 
@@ -542,8 +536,10 @@ def imported(contents: Contents, path: str) -> tuple[str, Spacecraft, Schedule]:
     (rates,), (quaternion,), tensor = record.rates, record.quaternions, contents.tensor
     if tensor is None or np.isnan(rates).any():
         name, absent = ("INERTIA", "moments of inertia") if tensor is None else ("ANGVEL", "rates")
-        cure = "--into merges the message into one that has them"
-        problem = f"missing; a spacecraft file needs {absent}: {cure}"
+        problem = (
+            f"missing; a spacecraft file needs {absent}: --into merges the message into one that "
+            "has them"
+        )
         raise FaultyFile([Fault(path, 1, 1, name, problem)])
     _, axes = principal_axes(tensor)
     torques = [axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
@@ -638,8 +634,8 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
         first = round(manoeuvres[0].start, DIGITS)
         return [
             (
-                "# All manoeuvres of the message are transverse and of one torque, "
-                "as a steerable torquer gives them."
+                "# All manoeuvres of the message are transverse and of one torque, as a steerable "
+                "torquer gives them."
             ),
             f"steerable: {{torque: {torquer!r} N m}}",
             *[f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"]
@@ -648,15 +644,15 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
     distinct = {tuple(manoeuvre.torque.tolist()): None for manoeuvre in manoeuvres}
     return [
         (
-            "# The torques that the message fires, as thrusters to begin with; without any, "
-            "an ideal steerable impulse is"
+            "# The torques that the message fires, as thrusters to begin with; without any, an "
+            "ideal steerable impulse is"
         ),
         "# assumed.",
         "# thrusters:",
         *(
             (
-                f"#   - {{name: MAN{place}, torque: "
-                f"[{', '.join(f'{part!r} N m' for part in torque)}]}}"
+                "#   - "
+                f"{{name: MAN{place}, torque: [{', '.join(f'{part!r} N m' for part in torque)}]}}"
             )
             for place, torque in enumerate(distinct, start=1)
         ),

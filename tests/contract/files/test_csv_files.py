@@ -17,7 +17,7 @@ from support import places
 from support.builders import Outcome, present
 from support.commands import result
 from support.commands import rows as rows_of
-from support.contract import Write, check_faults, faults
+from support.contract import Write, at, check_faults, check_parts, faults
 from support.golden import check_text
 from support.process import Run
 from support.spinners import FILE
@@ -76,12 +76,15 @@ def test_a_longer_on_time_is_what_the_thruster_then_does(read: Read, written: st
     """0.7 s instead of 0.564 s of pulse 4 leave 0.2477 deg, by the reference integrator too."""
     on_time = planning.plan(EXAMPLE, "four-pulse").pulses.pulses[3].on_time
     made, longer = read(written.replace(f",{on_time!r},-M2", ",0.7,-M2"))
-    last = made.pulses[-1]
-    assert (last.on_time, last.channel) == (0.7, "-M2")
-    assert last.start == pytest.approx(4.884622381967264, abs=1e-15)
-    assert last.impulse.tolist() == pytest.approx([0.0, -5.6, 0.0])
-    assert last.propellant == pytest.approx(0.7 * 10.0 / (220.0 * 9.80665))
-    assert last.force is not None
+    fired = {
+        "on_time": 0.7,
+        "channel": "-M2",
+        "start": pytest.approx(4.884622381967264, abs=1e-15),
+        "impulse": pytest.approx([0.0, -5.6, 0.0]),
+        "propellant": pytest.approx(0.7 * 10.0 / (220.0 * 9.80665)),
+    }
+    check_parts(made.pulses[-1], fired)
+    assert made.pulses[-1].force is not None
     left = propagation.flown(EXAMPLE, made).residual
     assert math.degrees(left.nutation) == pytest.approx(0.2477, abs=5e-5)
     assert left.nutation == pytest.approx(Outcome(EXAMPLE, made).nutation, abs=1e-9)
@@ -104,9 +107,8 @@ def test_what_was_written_is_read_without_a_word_and_three_columns_are_enough(
     rows = "".join(f"{pulse.start!r},{pulse.on_time!r},{pulse.channel}\n" for pulse in whole)
     bare, more = read(f"{TOP}\n{rows}")
     for one, other in zip(bare, whole, strict=True):
-        for name in ("t", "on_time", "channel", "propellant"):
-            assert getattr(one, name) == getattr(other, name)
-        assert np.array_equal(one.impulse, other.impulse)
+        same = ("t", "on_time", "channel", "propellant", "impulse")
+        check_parts(one, {name: at(other, name) for name in same})
     centres = "".join(f"{pulse.t!r},{pulse.on_time!r},{pulse.channel}\n" for pulse in whole)
     again, most = read(f"t_s,on_time_s,channel\n{centres}")
     assert [pulse.t for pulse in again] == [pulse.t for pulse in whole]
@@ -128,21 +130,34 @@ def test_the_centre_of_a_pulse_from_a_falling_tank_is_read_as_it_was_written(rea
     )
 
 
-def test_steered_pulses_and_ideal_impulses_have_a_torque_or_an_impulse(read: Read) -> None:
-    made, warnings = read(f"{TOP},{TORQUES}\n1,0.5,steerable,3,4,0\n", STEERED)
-    assert warnings == []
-    assert made.pulses[0].impulse.tolist() == pytest.approx([1.5, 2.0, 0.0])
-    assert made.pulses[0].propellant == pytest.approx(2.5 / (220.0 * 9.80665))
-    made, unknown = read(f"{TOP},{IMPULSES}\n1,0.5,XX,1.5,2,0.25\n", STEERED)
-    assert present(made.pulses[0].torque).tolist() == pytest.approx([3.0, 4.0, 0.5])
-    assert made.propellant is None
+STEERING: dict[str, tuple[nutdamp.Spacecraft, dict[str, Any]]] = {
+    f"{TOP},{TORQUES}\n1,0.5,steerable,3,4,0\n": (
+        STEERED,
+        {"0.impulse": [1.5, 2.0, 0.0], "0.propellant": 2.5 / (220.0 * 9.80665)},
+    ),
+    f"{TOP},{IMPULSES}\n1,0.5,XX,1.5,2,0.25\n": (
+        STEERED,
+        {"0.torque": [3.0, 4.0, 0.5], "0.propellant": None},
+    ),
     # The torque rules over the impulse, and is flown where it is not the torquer's.
-    made, other = read(f"{TOP},{TORQUES},{IMPULSES}\n1,0.5,steerable,6,8,0,1.5,2,0\n", STEERED)
-    assert made.pulses[0].impulse.tolist() == pytest.approx([3.0, 4.0, 0.0])
-    made, ideal = read(f"{TOP},{IMPULSES}\n1,0,+M1,4,0,0\n")
-    assert made.pulses[0].torque is None
-    assert made.pulses[0].impulse.tolist() == [4.0, 0.0, 0.0]
-    check_text("files.schedule-steered", "\n".join([*unknown, *other, *ideal]))
+    f"{TOP},{TORQUES},{IMPULSES}\n1,0.5,steerable,6,8,0,1.5,2,0\n": (
+        STEERED,
+        {"0.impulse": [3.0, 4.0, 0.0]},
+    ),
+    f"{TOP},{IMPULSES}\n1,0,+M1,4,0,0\n": (
+        EXAMPLE,
+        {"0.torque": None, "0.impulse": [4.0, 0.0, 0.0]},
+    ),
+}
+
+
+def test_steered_pulses_and_ideal_impulses_have_a_torque_or_an_impulse(read: Read) -> None:
+    said = []
+    for text, (body, expected) in STEERING.items():
+        made, warnings = read(text, body)
+        check_parts(made.pulses, {path: pytest.approx(part) for path, part in expected.items()})
+        said += warnings
+    check_text("files.schedule-steered", "\n".join(said))
 
 
 def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Path) -> None:
@@ -161,11 +176,8 @@ def test_on_times_off_the_limits_are_flown_with_a_warning(run: Run, tmp_path: Pa
         status=4,
     )
     pulses = json.loads(flown.stdout)["pulses"]
-    assert [pulse["on_time_s"] for pulse in pulses] == [0.001, 3.0]
-    assert [pulse["impulse_Nms"][:2] for pulse in pulses] == [
-        [pytest.approx(0.008), 0],
-        [0, pytest.approx(24.0)],
-    ]
+    fired = [[pulse["on_time_s"], *pulse["impulse_Nms"][:2]] for pulse in pulses]
+    assert np.array(fired) == pytest.approx(np.array([[0.001, 0.008, 0.0], [3.0, 0.0, 24.0]]))
     check_text("files.schedule-limits", flown.stderr)
 
 
@@ -268,9 +280,12 @@ def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> No
     )
     (row,) = rows_of((tmp_path / "blocks.csv").read_text())
     assert tuple(row) == BLOCKS_HEADER
-    assert float(row["delay_s"]) == pytest.approx(2e-3 * int(row["delay_counts"]))
-    assert float(row["delay_deg"]) == pytest.approx(72.0 * float(row["delay_s"]))
-    assert float(row["width_s"]) == pytest.approx(1e-2 * int(row["width_counts"]))
+    for column, factor, other in (
+        ("delay_s", 2e-3, "delay_counts"),
+        ("delay_deg", 72.0, "delay_s"),
+        ("width_s", 1e-2, "width_counts"),
+    ):
+        assert float(row[column]) == pytest.approx(factor * float(row[other]))
     pulses = rows_of((tmp_path / "pulses.csv").read_text())
     assert row["first_utc"] == pulses[0]["utc"]
     assert len(pulses) == int(row["count"])

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from support import places, reference
 from support.builders import cross, one_of, present
 from support.cases import spread
-from support.contract import BASE, Write, check_faults
+from support.contract import BASE, Write, at, check_faults, check_parts
 from support.golden import check_text
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.keys import SPACECRAFT
 from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE, read_pulses
 from nutdamp.flight import propagation
@@ -35,7 +35,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import broken_limits, infeasibility
 from nutdamp.planning.decision import compare
 from nutdamp.schemes.catalogue import CLASSIC
-from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -71,17 +71,6 @@ def read(text: str) -> Spacecraft:
 def of(lines: str, keys: str = LEAST) -> Spacecraft:
     """The spacecraft of a file with ``keys`` and ``lines``."""
     return read(f"{{{keys}, {lines}}}")
-
-
-def channel(spacecraft: Spacecraft, name: str) -> Channel:
-    return next(channel for channel in spacecraft.channels if channel.name == name)
-
-
-def at(value: Any, path: str) -> Any:
-    """The part of a spacecraft at ``path``, such as ``channels.0.name``; arrays as lists."""
-    for step in path.split("."):
-        value = value[int(step)] if step.isdigit() else getattr(value, step)
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 EVERY_PART = {
@@ -121,12 +110,35 @@ NO_PARTS = {
     "torquer.torque": None,
 }
 TWO_THRUSTERS = "thrusters: [{name: a, torque: [1, 0, 0], isp: 220}, {name: b, torque: [0, 1, 0]}]"
+DISTURBANCES = {
+    "{name: T, torque: [20 mN m, 0.1, 1e-3]}": Disturbance(0.02 + 0.1j, 0.001, 0.0, "T"),
+    "{kind: constant, torque: [0, 0, -1]}": Disturbance(0j, -1.0),
+    "{kind: rotating, torque: [5 mN m, -1, 0], rate: 60 rpm}": Disturbance(
+        0.005 - 1j, 0.0, 2 * math.pi
+    ),
+    "{torque: [0, 2, 0], rate: -3}": Disturbance(2j, 0.0, -3.0),
+    "{kind: rotating, torque: [1, 0, 0], fixed_in: inertial}": Disturbance(1 + 0j, 0.0, 3.0),
+    "{torque: [1, 0, 0], fixed_in: inertial}": Disturbance(1 + 0j, 0.0, 3.0),
+    "{kind: axial, torque: -1 mN m}": Disturbance(0j, -0.001),
+    "{kind: axial, torque: 2}": Disturbance(0j, 2.0),
+    "{kind: axial, torque: [0, 0, 2 N m]}": Disturbance(0j, 2.0),
+    "{torque: [1, 0, 1e-13], rate: 2}": Disturbance(
+        1 + 0j, 1e-13, 2.0
+    ),  # rounding, but not dropped
+}
+"""In the order of the file; with the name of a thruster, too."""
+
 PARTS: dict[str, tuple[str, dict[str, object]]] = {
     "everything": (EVERYTHING, EVERY_PART),
     "least": (f"{{{LEAST}}}", NO_PARTS),
     "empty sections": (
         f"{{{LEAST}, requirement: {{}}, disturbances: []}}",
         {"requirement": None, "disturbances": ()},
+    ),
+    "disturbances": (
+        f"{{{LEAST}, thrusters: [{{name: T, torque: [1, 0, 0]}}], "
+        f"disturbances: [{', '.join(DISTURBANCES)}]}}",
+        {"disturbances": tuple(DISTURBANCES.values())},
     ),
     # Without channels each thruster is one; without a lever arm its thrust is open.
     "thrusters": (
@@ -268,16 +280,18 @@ def test_vectors_of_a_tensor_file_are_turned_to_principal_axes() -> None:
     }
     craft = read(json.dumps(contents))
     # Principal axes have no sense of their own: the file's may come out turned by 180 degrees.
-    axes = craft.inertia.axes
-    signs = np.diag(np.round(axes.T @ turn))
-    assert_allclose(axes * signs, turn, atol=1e-12)
-    assert_allclose(craft.inertia.moments, [130.0, 120.0, 80.0], rtol=1e-13)
-    assert_allclose(craft.omega0 * signs, omega0, atol=1e-13)
+    signs = np.diag(np.round(craft.inertia.axes.T @ turn))
     force = 10 * direction / np.linalg.norm(direction)
-    first, second = craft.channels[0].thrusters[0], craft.channels[1].thrusters[0]
-    assert_allclose(present(first.force) * signs, force, atol=1e-13)
-    assert_allclose(first.torque * signs, np.cross(position, force), atol=1e-13)
-    assert_allclose(second.torque * signs, torque, atol=1e-13)
+    expected = {
+        "inertia.axes": turn * signs,
+        "inertia.moments": [130.0, 120.0, 80.0],
+        "omega0": omega0 * signs,
+        "channels.0.thrusters.0.force": force * signs,
+        "channels.0.thrusters.0.torque": np.cross(position, force) * signs,
+        "channels.1.thrusters.0.torque": torque * signs,
+    }
+    for path, values in expected.items():
+        assert_allclose(at(craft, path), values, rtol=1e-13, atol=1e-12)
     # The attitude stays that of the file's axes; the initial state is that of the principal ones.
     momentum = np.diag(craft.inertia.moments) @ craft.omega0
     in_frame = attitude.rotate(present(craft.attitude).quaternion, tensor @ turn @ omega0)
@@ -289,34 +303,8 @@ def test_vectors_of_a_tensor_file_are_turned_to_principal_axes() -> None:
             "A: 120 kg m^2, C: 80 kg m^2", "tensor: [[120, 0, 0], [0, 120, 0], [0, 0, 80]]"
         )
     )
-    assert aligned.inertia.aligned
-    assert aligned.inertia.moments == whole.inertia.moments
-    assert_array_equal(aligned.omega0, whole.omega0)
-    assert_array_equal(channel(aligned, "+M1").torque, channel(whole, "+M1").torque)
-
-
-def test_disturbances() -> None:
-    """In the order of the file; with the name of a thruster, too."""
-    expected = {
-        "{name: T, torque: [20 mN m, 0.1, 1e-3]}": Disturbance(0.02 + 0.1j, 0.001, 0.0, "T"),
-        "{kind: constant, torque: [0, 0, -1]}": Disturbance(0j, -1.0),
-        "{kind: rotating, torque: [5 mN m, -1, 0], rate: 60 rpm}": Disturbance(
-            0.005 - 1j, 0.0, 2 * math.pi
-        ),
-        "{torque: [0, 2, 0], rate: -3}": Disturbance(2j, 0.0, -3.0),
-        "{kind: rotating, torque: [1, 0, 0], fixed_in: inertial}": Disturbance(1 + 0j, 0.0, 3.0),
-        "{torque: [1, 0, 0], fixed_in: inertial}": Disturbance(1 + 0j, 0.0, 3.0),
-        "{kind: axial, torque: -1 mN m}": Disturbance(0j, -0.001),
-        "{kind: axial, torque: 2}": Disturbance(0j, 2.0),
-        "{kind: axial, torque: [0, 0, 2 N m]}": Disturbance(0j, 2.0),
-        "{torque: [1, 0, 1e-13], rate: 2}": Disturbance(
-            1 + 0j, 1e-13, 2.0
-        ),  # rounding, but not dropped
-    }
-    craft = of(
-        f"thrusters: [{{name: T, torque: [1, 0, 0]}}], disturbances: [{', '.join(expected)}]"
-    )
-    assert craft.disturbances == tuple(expected.values())
+    same = ("inertia.moments", "omega0", "channels.0.torque")
+    check_parts(aligned, {"inertia.aligned": True, **{path: at(whole, path) for path in same}})
 
 
 def test_disturbances_are_turned_to_principal_axes_with_nothing_dropped() -> None:
@@ -391,19 +379,20 @@ def uncommented(text: str, *keys: str) -> str:
 
 def test_the_example_is_the_one_it_describes_and_shows_every_key() -> None:
     craft = read(example_text())
-    assert (craft.name, craft.mass, craft.inertia.moments) == (
-        "Sounder-1",
-        250.0,
-        (120.0, 120.0, 80.0),
-    )
-    assert craft.spin == pytest.approx(math.pi)
-    assert craft.nutation == pytest.approx(math.radians(5))
+    described = {
+        "name": "Sounder-1",
+        "mass": 250.0,
+        "inertia.moments": (120.0, 120.0, 80.0),
+        "spin": pytest.approx(math.pi),
+        "nutation": pytest.approx(math.radians(5)),
+    }
+    check_parts(craft, described)
     torques = {channel.name: channel.torque.tolist() for channel in craft.channels}
     assert torques == {"+M1": [8, 0, 0], "-M1": [-8, 0, 0], "+M2": [0, 8, 0], "-M2": [0, -8, 0]}
     # A handful of pulses of an eighth of the nutation period each removes the nutation.
     assert 2 < craft.least_impulse / (8.0 * craft.body_period / 8) < 6
     sections = [json_schema(), *json_schema()["$defs"].values()]
-    assert sections[0]["properties"].keys() == SpacecraftFile.fields().keys()
+    assert sections[0]["properties"].keys() == SPACECRAFT.keys.keys()
     for section in sections:
         for key in section["properties"]:
             assert re.search(rf"\b{key}:", example_text()), key
@@ -413,14 +402,20 @@ def test_what_the_example_shows_in_comments_works() -> None:
     keys = ("attitude", "channels", "steerable", "limits", "disturbances", "dissipation")
     craft = read(uncommented(example_text(), *keys).replace("  # - {", "  - {"))
     assert None not in (craft.attitude, craft.steerable)
-    assert [channel.name for channel in craft.channels] == ["upper", "lower"]
-    assert (craft.limits.horizon, craft.limits.blackout) == (120.0, ((10.0, 20.0),))
+    shown = {
+        "channels.0.name": "upper",
+        "channels.1.name": "lower",
+        "limits.horizon": 120.0,
+        "limits.blackout": ((10.0, 20.0),),
+        "dissipation": 600.0,
+        "dispersions.timing_offset": Tolerance("bias", 0.002),
+    }
+    check_parts(craft, shown)
     rates = {disturbance.name: disturbance.rate for disturbance in craft.disturbances}
     assert rates == {"leak": 0.0, "pump": -3.0, "sunlight": -craft.spin, "drag": 0.0, "burn": 0.0}
-    assert (craft.spin_drift(10.0, 20.0), craft.dissipation) == (-0.001 / 80, 600.0)
+    assert craft.spin_drift(10.0, 20.0) == -0.001 / 80
     thrusters = ["+M1", "-M1", "+M2", "-M2", "spin-up", "steerable"]
     assert [*present(craft.dispersions).thrust] == thrusters
-    assert present(craft.dispersions).timing_offset == Tolerance("bias", 0.002)
     others = re.sub(r"^(state|inertia): .*\n", "", example_text(), flags=re.MULTILINE)
     nutation = read(uncommented(others, "inertia", "omega0")).nutation
     assert nutation == pytest.approx(math.radians(5), rel=0.05)
@@ -528,8 +523,7 @@ ACTUATED: dict[str, tuple[str, dict[str, object]]] = {
 
 @pytest.mark.parametrize(("text", "parts"), (PARTS | ACTUATED).values(), ids=PARTS | ACTUATED)
 def test_parts_of_a_file_are_read(text: str, parts: dict[str, object]) -> None:
-    craft = read(text)
-    assert {path: at(craft, path) for path in parts} == parts
+    check_parts(read(text), parts)
 
 
 def test_valves_of_no_times_are_none_and_plans_the_same_to_the_last_bit() -> None:

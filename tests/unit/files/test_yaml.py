@@ -7,24 +7,41 @@ import math
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
-from support.builders import present, within
+from support.builders import within
 from support.cases import spread
 from support.golden import check_text
 
 from nutdamp.errors import BadRequest, CannotRead, CannotWrite, FaultyFile
 from nutdamp.files.editing import edited
-from nutdamp.files.fields import Field, Length, Problems, Quantity, Section, Within
-from nutdamp.files.reader import example_text, section_schema
+from nutdamp.files.fields import (
+    NAME,
+    Finding,
+    Key,
+    ValueKind,
+    Values,
+    choice,
+    definitions,
+    either,
+    flag,
+    named,
+    optional,
+    quantity,
+    required,
+    row,
+    rows,
+    section,
+    whole,
+)
+from nutdamp.files.reader import example_text
 from nutdamp.files.tabular import json_text, make_folder, whole_file, write_whole
 from nutdamp.files.yaml import (
     MAX_BYTES,
     MAX_DEPTH,
     MAX_NODES,
-    Place,
     decode,
     dotted,
     read_text,
@@ -152,7 +169,7 @@ def test_places_count_from_one_and_leave_out_byte_order_marks() -> None:
     keys = {("a",): (2, 1), ("a", "b", 1, "x"): (3, 11), ("a", "b", 0): (3, 7), (): (2, 1)}
     assert {path: (*root.key_place_of(path)[:2],) for path in keys} == keys
     marked, _ = read_tree("\ufeffa: 1\r\nb: 2\r\n", "f.yaml")
-    assert (marked.plain(), marked.place_of(("b",))) == ({"a": 1, "b": 2}, Place(2, 4))
+    assert (marked.plain(), marked.place_of(("b",))[:2]) == ({"a": 1, "b": 2}, (2, 4))
     assert decode(b"\xef\xbb\xbfa: 1", "f.yaml") == "a: 1"
 
 
@@ -315,8 +332,10 @@ def test_a_whole_block_gives_way_to_a_flow_value_and_a_key_to_another_name() -> 
 
 
 @pytest.mark.parametrize("end", ["", "\n", "\n\n# the end\n", "\n# the end"])
-def test_a_text_may_end_as_it_likes(end: str) -> None:
-    made = edited("a: 1\nb: {c: 2}" + end, {("d",): "4", ("b", "e"): "5"})
+@pytest.mark.parametrize("text", ["a: 1\nb: {c: 2}", '{\n\t"a": 1,\n\t"b": {"c": 2}\n}'])
+def test_a_text_may_end_as_it_likes(text: str, end: str) -> None:
+    """JSON indented with tabs, too."""
+    made = edited(text + end, {("d",): "4", ("b", "e"): "5"})
     assert plain(made) == {"a": 1, "b": {"c": 2, "e": 5}, "d": 4}
     assert made.endswith(end)
 
@@ -331,32 +350,36 @@ def test_an_alias_and_what_has_one_are_refused_and_an_anchor_without_one_is_no_h
 
 # --- sections as classes: every type that a key may have, read and in the schema
 
-Time = Annotated[float, Quantity("time", minimum=0)]
+TIME = quantity("time", minimum=0)
 
 
-def key(default: Any = None) -> Any:
-    return Field("What it is.", default=default)
+def key(kind: ValueKind, default: Any = None) -> Key:
+    return optional(kind, "What it is.", default=default)
 
 
-class Inner(Section):
-    """Below."""
+INNER = section("Inner", "Below.", {"t": required(TIME, "Time of it, s.", "1 s")})
+OUTER = section(
+    "Outer",
+    "Every kind.",
+    {
+        "text": key(NAME),
+        "whole": key(whole(1, 9)),
+        "flag": key(flag(), False),
+        "choice": key(choice("one", "two")),
+        "times": key(rows(TIME, 2, 3)),
+        "pair": key(row(TIME, whole(0, 9))),
+        "named": key(named(INNER, 1)),
+        "either": key(either(rows(TIME, 1), INNER)),
+        "inner": key(INNER),
+        "inners": key(rows(INNER), []),
+    },
+)
 
-    t: Time = Field("Time of it, s.", "1 s")
 
-
-class Outer(Section):
-    """Every type."""
-
-    text: Annotated[str, Length(1)] | None = key()
-    whole: Annotated[int, Within(1, 9)] | None = key()
-    flag: bool = key(False)
-    choice: Literal["one", "two"] | None = key()
-    times: Annotated[list[Time], Length(2, 3)] | None = key()
-    pair: tuple[Time, int] | None = key()
-    named: Annotated[dict[str, Inner], Length(1)] | None = key()
-    either: Annotated[list[Time], Length(1)] | Inner | None = key()
-    inner: Inner | None = key()
-    inners: list[Inner] = key([])
+def read(contents: object) -> tuple[Any, list[Finding]]:
+    """The section in a file, and what is wrong."""
+    values = Values(read_tree(json.dumps(contents), "f.yaml")[0])
+    return values.read(OUTER, values.root), values.findings
 
 
 GOOD: dict[str, tuple[Any, object]] = {
@@ -389,29 +412,25 @@ BAD: dict[str, tuple[Any, ...]] = {
 
 
 def test_what_is_right_is_read_also_within_lists_and_mappings() -> None:
-    problems: Problems = []
     for name, (value, expected) in GOOD.items():
-        assert getattr(Outer.read({name: value}, problems), name) == expected
-    read = present(Outer.read(SECTIONS, problems))
-    assert read.flag is False  # by default
-    assert isinstance(read.either, Inner)
-    parts = [present(read.named)["a"], read.either, present(read.inner), *read.inners]
+        contents, findings = read({name: value})
+        assert (getattr(contents, name), findings) == (expected, [])
+    contents, findings = read(SECTIONS)
+    assert contents.flag is False  # by default
+    parts = [contents.named["a"], contents.either, contents.inner, *contents.inners]
     assert [part.t for part in parts] == [1, 2, 3, 4, 5]
-    assert problems == []
+    assert findings == []
 
 
 def test_what_is_wrong_is_said_where_it_is_and_all_of_it_at_once() -> None:
     """Each is one fault: also a list too long with a wrong entry."""
     lines = []
     for name, value in ((name, value) for name, values in BAD.items() for value in values):
-        problems: Problems = []
-        Outer.read({name: value}, problems)
-        ((where, problem),) = problems
+        ((where, problem, _),) = read({name: value})[1]
         lines.append(f"{name}: {value!r} -> {where}: {problem}")
     check_text("files.sections", "\n".join(lines))
-    problems = []
-    Outer.read({"whole": 0, "times": [-1, "x"], "inner": {}}, problems)
-    assert [where for where, _ in problems] == [
+    several = read({"whole": 0, "times": [-1, "x"], "inner": {}})[1]
+    assert [finding.path for finding in several] == [
         ("whole",),
         ("times", 0),
         ("times", 1),
@@ -420,8 +439,7 @@ def test_what_is_wrong_is_said_where_it_is_and_all_of_it_at_once() -> None:
 
 
 def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
-    parts: dict[str, Any] = {}
-    schema = {**section_schema(Outer, parts), "$defs": parts}
+    schema = {**OUTER.definition, "$defs": definitions(OUTER)}
     Draft202012Validator.check_schema(schema)
     judge = Draft202012Validator(schema)
     assert all(
