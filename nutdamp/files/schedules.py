@@ -231,6 +231,8 @@ def _warn_of_contradictions(row: Row, pulse: Pulse, axes: Vector) -> None:
         if stated is not None and abs(stated - value) > CONTRADICTS * sizes[column]:
             rule = "start, on-time and channel rule"
             row.warn(column, f"{column} {row[column]} is ignored, {value:.6g} follows: {rule}")
+            if column in TORQUE:
+                return  # another torque has another impulse too
 
 
 def read_plan(

@@ -558,4 +558,5 @@ def conservation(verification: Verification) -> Note:
 def _course(course: Conservation) -> str:
     how = f"changed by {' and '.join(course.changed)}" if course.changed else "constant to rounding"
     how = "NOT constant" if course.kept is False else how
-    return f"{how} (by {_difference(course.drift)} of itself at most)" if course.drift else how
+    drift = _difference(course.drift)
+    return how if drift == "0" else f"{how} (by {drift} of itself at most)"

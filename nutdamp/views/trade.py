@@ -99,6 +99,10 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
     def met(row: TradeRow) -> bool | None:
         return row.point.verdict.met
 
+    def saved(row: TradeRow) -> str:
+        first = next(other for other in rows if other.front is row.front)
+        return fixed(100.0 * (row.point.cost / first.point.cost - 1.0), 1)
+
     columns = [
         Column.named("point=number", "point", "", where=everywhere, kind=WHOLE),
         Column.named(
@@ -131,8 +135,8 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             rank=1,
         ),
         *file_columns("csv", "axis_error_deg=residual.axis_error"),
-        Column("", f"vs point {first}", "%", _saved, where="full"),
-        Column("", "vs first", "%", _saved, where="" if others else "brief", rank=3),
+        Column("", f"vs point {first}", "%", saved, where="full"),
+        Column("", "vs first", "%", saved, where="" if others else "brief", rank=3),
         Column.named(
             "scheme=point.plan.scheme",
             Shared.SCHEME,
@@ -158,11 +162,6 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
         ),
     ]
     return DataTable("Schedules by their ends", columns, rows)
-
-
-def _saved(row: TradeRow) -> str:
-    """Extra cost over the point that ends first on the front, %."""
-    return fixed(100.0 * (row.point.cost / row.front.points[0].cost - 1.0), 1)
 
 
 def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
@@ -193,8 +192,7 @@ def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
     notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
-    shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
-    rows = [points[index] for index in sorted(shown)]
+    rows = _shown_once(points)
     if len(rows) < len(points):
         notes.append(note("trade-points", shown=len(rows), count=len(points)))
     return summary(
@@ -203,6 +201,16 @@ def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
         [*notes, *_ends_off(fronts)],
         "--csv points.csv · --plot trade.png · --schedules FOLDER",
     )
+
+
+def _shown_once(points: Sequence[TradeRow]) -> list[TradeRow]:
+    """The points of a screen: of those with the same printed values the first, and evenly some of
+    more than `ROWS`.
+    """
+    printed = [cells[1:] for cells in _table(points).cells("brief")]  # without the number
+    rows = [row for at, row in enumerate(points) if printed[at] not in printed[:at]]
+    evenly = np.linspace(0, len(rows) - 1, min(ROWS, len(rows)))
+    return [rows[round(at)] for at in evenly.tolist()]
 
 
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
@@ -344,9 +352,11 @@ def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
 
-def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Iterator[Note]:
-    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that
-    costs more.
+def trade_notes(
+    fronts: Sequence[Front], chosen: Plan, judged: Verdict, craft: str = "SPACECRAFT"
+) -> Iterator[Note]:
+    """The schedule of a front that is better than the ``chosen`` plan, with its command for the
+    words ``craft`` of a spacecraft; or that costs more.
     """
     better = _better(fronts, chosen, misses=judged.met is False)
     if better is not None:
@@ -356,7 +366,8 @@ def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Itera
         if 0.0 < shift < math.inf:
             aim = f'--shift "{degrees(shift)}" '
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
-        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {aim}{horizon}"
+        plan = " ".join(filter(None, ("nutdamp plan", craft)))
+        command = f"{plan} --scheme {row.point.plan.scheme} {aim}{horizon}"
         shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
         if judged.met is False:
             yield note("trade-meets", point=row.number, command=command, **shown)

@@ -607,6 +607,9 @@ def test_words_are_explained_however_they_are_written() -> None:
         "on-time s",
         "on_time_s",
         "nutation after, deg",
+        "spin axis: tilt",
+        "H: azimuth",
+        "H: right ascension",
     ):
         assert is_known(word), word
     assert explain.explained("on-time s").summary == explain.explained("On-Time").summary
