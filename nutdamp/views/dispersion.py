@@ -31,7 +31,7 @@ from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.glance import end_rows
-from nutdamp.views.parts import named, summary
+from nutdamp.views.parts import STEP, named, summary
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -42,7 +42,7 @@ from nutdamp.views.tables import (
     to_figures,
     values_of,
 )
-from nutdamp.views.text import digits, ordered, screen_line
+from nutdamp.views.text import digits
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.controller import Ending
@@ -116,36 +116,43 @@ def dispersion_screen(
         drawn += f", unphysical and drawn again: {results.redrawn:,}"
     title = named(study.model.spacecraft, f": {flown.plan.scheme}, {how}; {drawn}")
     head = [title, *verdict_lines(judged, results)]
-    emptied = []
     if results.emptied:
         share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
         words = (f"empty too soon in {share} of cases", "red")
-        emptied.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
+        head.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
     percentiles = percentile_table(results, FLOWN_OUTPUTS, study.outputs_of({}), alone=True)
     varies = any(entry.sigma for entry in study.model.inputs.drawn)
-    if not verbose:
-        case = f" · {again(results)} (worst)" if varies else ""
-        return summary(
-            [*head, *emptied],
-            lambda **_: percentiles.screen("screen"),
-            [*main_causes(judged), *tolerances.unused_notes(study.model.inputs.unused), *planned],
-            f"--plot cases.png{case}",
-        )
-    parts = [*head, Text(), percentiles.screen("full")]
-    if not results.exact:
+    steps = ["--plot cases.png"]
+    if varies:
+        steps.append(f"{again(results)} (worst)")
+    accuracy = []
+    if verbose and not results.exact:
         right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
-        parts.append(Text(right, style="dim"))
+        accuracy.append(Text(right, style="dim"))
+    return summary(
+        head,
+        lambda **_: Group(percentiles.screen("full" if verbose else "screen"), *accuracy),
+        [
+            *(() if verbose else main_causes(judged)),
+            *tolerances.unused_notes(study.model.inputs.unused),
+            *planned,
+        ],
+        STEP.join(steps),
+        more=_details(flown, worst if varies else 0) if verbose else (),
+        verbose=verbose,
+    )
+
+
+def _details(flown: Dispersion, worst: int) -> Iterator[RenderableType]:
+    """The nominal case, the tolerance budget and the ``worst`` cases of a study."""
+    results, study = flown.core, flown.core.study
     ends = facts(end_rows(flown.plan._flight, flown.plan._aspects))
-    parts += [Text(), Text("Nominal case", style="bold"), ends]
-    if emptied:
-        parts += [Text(), *emptied]
-    parts += [Text(), *tolerances.tolerance_budget(results)]
-    if worst and varies:
+    yield Group(Text("Nominal case", style="bold"), ends)
+    yield Group(*tolerances.tolerance_budget(results))
+    if worst:
         cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
-        parts += [Text(), Text(cases.title, "bold"), cases.screen("screen")]
-        parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim"))
-    notes = ordered([*tolerances.unused_notes(study.model.inputs.unused), *planned])
-    return Group(*parts, *map(screen_line, notes))
+        one = Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim")
+        yield Group(Text(cases.title, "bold"), cases.screen("screen"), one)
 
 
 def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
 from nutdamp.views.glance import end_facts, headline, scheme_table
-from nutdamp.views.parts import named, pulse_table
+from nutdamp.views.parts import named, pulse_table, summary
 from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
     TEXT,
@@ -43,8 +43,6 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     joined,
     note_json,
-    ordered,
-    rank,
     screen_line,
     sentence,
     small_angle,
@@ -82,9 +80,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         on_times = ((f"on-time of {name}", f"{total:.4f} s") for name, total in totals.items())
         tables += [pulse_table(chosen._flight).screen("full"), facts(on_times)]
     notes += [note for plan in compared.plans for note in plan_notes(plan)]
-    spaced = [part for table in tables for part in (Text(), table)]
-    lines = [*map(screen_line, sorted(ordered(notes), key=rank))]
-    return Group(*head, *spaced, *([Text()] if lines else []), *lines)
+    return summary(head, None, notes, "", more=tables, verbose=True)
 
 
 def robust_screen(robust: RobustComparison) -> RenderableType:

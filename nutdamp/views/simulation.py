@@ -51,9 +51,7 @@ from nutdamp.views.text import (
     degrees,
     mass,
     moment,
-    ordered,
     quantity,
-    screen_line,
     small_angle,
 )
 
@@ -439,31 +437,27 @@ def verification_screen(
         for method in verification.methods
         if method.missing
     ]
-    methods = methods_table(verification).screen("screen")
-    if verbose:
-        return Group(
-            *head,
-            *(Text(), decisions.derived_table(spacecraft)),
-            *(Text(), methods),
-            *(Text(), Text(BUDGET, "bold"), Text()),
-            *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
-            Text(),
-            *map(screen_line, ordered((*missing, conservation(verification), *planned))),
-        )
-    notes = [conservation(verification)]
+    notes = [conservation(verification), *missing, *planned]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
-    # impulses.
+    # impulses; the budget shows them all.
     single = [
         row
         for row in verification.budget
         if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name
     ]
     worst = max(single, key=lambda row: row.nutation, default=None)
-    if worst is not None and worst.nutation - verification.budget[0].nutation > SHOWN:
+    least = verification.budget[0].nutation
+    if not verbose and worst is not None and worst.nutation - least > SHOWN:
         angle = math.degrees(worst.nutation)
-        notes.append(note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
+        notes.insert(1, note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
+    budget = budget_table(spacecraft, verification).screen("screen")
     return parts.summary(
-        head, lambda **_: methods, [*notes, *missing, *planned], "--json verified.json"
+        [*head, *((Text(), decisions.derived_table(spacecraft)) if verbose else ())],
+        lambda **_: methods_table(verification).screen("screen"),
+        notes,
+        "--json verified.json",
+        more=[Group(Text(BUDGET, "bold"), Text(), budget, Text(BUDGET_NOTE, "dim"))],
+        verbose=verbose,
     )
 
 

@@ -187,8 +187,8 @@ def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
         words = coloured(f"{len(good)} of {len(points)} schedules may be flown", light)
         head.append(Text.assemble(("Requirement ", "bold"), f"({required}) ", words))
     if verbose:
-        derived = derived_table(spacecraft)
-        return Group(*head, Text(), derived, *front_parts(spacecraft, fronts))
+        more = [derived_table(spacecraft), *front_parts(spacecraft, fronts)]
+        return summary(head, None, (), "", more=more, verbose=True)
     notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
@@ -214,27 +214,24 @@ def _shown_once(points: Sequence[TradeRow]) -> list[TradeRow]:
 
 
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
-    """The table of each front under its name."""
+    """The table of each front under its name, and notes on all."""
     parts: list[RenderableType] = []
     for front in fronts:
-        parts += [
-            Text(),
-            Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold"),
-        ]
+        name = front_name(front, pointing=spacecraft.goal.axis is not None)
+        lines: list[RenderableType] = [Text(name, style="bold")]
         if front.why is not None:
-            parts.append(Text(_without_optimal(front)))
+            lines.append(Text(_without_optimal(front)))
         if front.points:
-            parts.append(
-                _table([row for row in rows_of(fronts) if row.front is front]).screen("full")
-            )
+            rows = [row for row in rows_of(fronts) if row.front is front]
+            lines.append(_table(rows).screen("full"))
+        parts.append(Group(*lines))
     priced = [(row.spent(row.point.cost), row.spent(row.bound)) for row in rows_of(fronts)
               if row.bound is not None and row.point.cost < row.bound]  # fmt: skip
     # As the table writes both.
     differ = any(spent != bound for spent, bound in priced)
     below = [note("trade-below-bound")] if differ else []
-    for sentence in sentences((*below, *_ends_off(fronts))):
-        parts += [Text(), Text(sentence, style="dim")]
-    return parts
+    told = sentences((*below, *_ends_off(fronts)))
+    return [*parts, *(Text(sentence, style="dim") for sentence in told)]
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
