@@ -408,31 +408,6 @@ def exported(run: Run, command: str, status: int = 0) -> str:
     return call(run, command, status=status).stdout
 
 
-def test_messages_go_to_standard_output_or_a_file(run: Run, tmp_path: Path) -> None:
-    assert exported(run, APM).startswith("CCSDS_APM_VERS = 2.0\n")
-    assert exported(run, APM).count("MAN_START") == 2
-    assert exported(run, f"{APM} --xml").startswith('<?xml version="1.0" encoding="UTF-8"?>\n<apm ')
-    track = call(run, "export dated.yaml --format aem --scheme two-pulse -o track.XML")
-    assert (track.stdout, "wrote track.XML: two-pulse, 2 pulses" in track.stderr) == ("", True)
-    assert "<quaternionAngVel>" in (tmp_path / "track.XML").read_text()
-    quiet = run(
-        "export",
-        "-q",
-        "dated.yaml",
-        "--format",
-        "stk",
-        "--scheme",
-        "none",
-        "-o",
-        "free.a",
-        "--until",
-        "2 s",
-    )
-    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
-    assert (tmp_path / "free.a").read_text().splitlines()[-2].startswith("2.000000000 ")
-    assert exported(run, "export --format basilisk --scheme two-pulse")  # needs no epoch
-
-
 def test_the_plan_as_json_is_that_of_plan(run: Run) -> None:
     """By its dispersed cases, whether a scheme is named or not."""
     for scheme in ("--scheme four-pulse", ""):

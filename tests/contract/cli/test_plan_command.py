@@ -16,7 +16,6 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.common import work
-from nutdamp.files.reader import example_text
 from nutdamp.files.schedules import PULSES_HEADER
 from nutdamp.schemes import two_pulse
 from nutdamp.spacecraft.schedule import Schedule
@@ -321,12 +320,6 @@ def test_an_undecided_share_does_not_meet(run: Run, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(work, "CASES", 1.0)
     found = planned(run, "--scheme", "two-pulse", status=4)
     assert (found["decision"]["status"], found["decision"]["met"]) == ("not-shown", False)
-
-
-def test_no_requirement_no_cases(run: Run) -> None:
-    text = example_text().replace("\nrequirement:", "\n# requirement:")
-    ended = run("plan", "-", *QUICK, "--json", "-", stdin=text)
-    assert json.loads(ended.stdout)["decision"]["cases"] is None
 
 
 def test_no_plan_can_be_commanded() -> None:
