@@ -110,6 +110,7 @@ def test_commands(
             ended = run(*shlex.split(line), *(["--json", "-"] if paths else []), columns=columns)
         assert "Traceback" not in ended.stderr
         assert (ended.returncode, row) == (int(status), row), ended.stderr
+        assert not re.search(" $", ended.stdout, re.MULTILINE), row  # no blanks fill up lines
         assert paths or not re.search(r"…(?! +\d+ more)", ended.stdout), row  # no value is cut
         if page is not None:
             told = said_on((tmp_path / "report.html").read_text(encoding="utf-8"))

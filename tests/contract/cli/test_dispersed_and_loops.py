@@ -98,14 +98,6 @@ def test_seeds_are_other_noise(
     assert first == same != other
 
 
-def test_where_nutation_grows_the_default_end_comes_after_a_cycle(run: Run) -> None:
-    shown = run(
-        "loop", "craft.yaml", "--set", "dissipation={time_constant: 600 s}", "--json", "-"
-    ).stdout
-    assert len(json.loads(shown)["quiet_s"]) >= 2
-    assert json.loads(shown)["pulses"][-1]["start_s"] > 500.0
-
-
 @pytest.mark.deep
 @spread(
     "sensor", ["{kind: gyro}", "{kind: accelerometer, rate: 20 Hz, position: [1, 0, 0]}"], quick=1

@@ -453,26 +453,6 @@ def test_what_a_format_needs_is_named_and_can_be_pasted(run: Run, tmp_path: Path
         assert exported(run, f"export {name}.yaml --format aem --scheme one-pulse")
 
 
-def test_an_orbit_makes_an_opm_whole_and_without_one_it_is_a_part(run: Run, tmp_path: Path) -> None:
-    command = (
-        "export",
-        str(places.CONFIGS / "communications-spinner.yaml"),
-        "--format",
-        "opm",
-        "--scheme",
-        "four-pulse",
-    )
-    part = run(*command, status=0)
-    assert "warning: the spacecraft file has no orbit" in part.stderr
-    assert "\nCOMMENT Only the part with the manoeuvres" in part.stdout
-    orbit = "orbit={position: [42164 km, 0, 0], velocity: [0, 3.0747 km/s, 0]}"
-    whole = run(*command, "--set", orbit, "-o", "whole.xml")
-    assert (whole.returncode, "no orbit" in whole.stderr) == (0, False)
-    text = (tmp_path / "whole.xml").read_text()
-    assert '<X units="km">42164.0</X>' in text
-    assert text.count("<maneuverParameters>") == part.stdout.count("MAN_EPOCH_IGNITION") > 0
-
-
 def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
     """The kind of a message need not be named."""
     call(run, f"{APM} -o there.apm")
@@ -488,8 +468,6 @@ def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
 
 def test_a_message_that_fires_nothing_gives_an_empty_schedule(run: Run, tmp_path: Path) -> None:
     written(tmp_path, a_apm=exported(run, "export dated.yaml --format apm --scheme none"))
-    assert "fires nothing" in exported(run, "import apm a.apm")
-    assert len(exported(run, "import -q apm a.apm -o a.yaml --schedule -").splitlines()) == 1
     written(tmp_path, b_apm=(tmp_path / "a.apm").read_text().replace("= UTC", "= TAI"))
     (said,) = read_message(str(tmp_path / "b.apm")).remarks
     loud, quiet = (call(run, f"import apm b.apm -o b.yaml{more}").stderr for more in ("", " -q"))

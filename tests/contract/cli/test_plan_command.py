@@ -124,28 +124,6 @@ def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None
 # ---------------------------------------------------------------------------------------
 
 
-def test_cones_pulses_per_turn_and_the_sun_are_heeded(run: Run, tmp_path: Path) -> None:
-    written(
-        tmp_path, body_yaml="name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n"
-    )
-    aimed = "plan body.yaml --target 30deg,0deg --scheme"
-    cones, straight, turns, by_sun = (
-        result(run, f"{aimed} {options}")["plans"][0]
-        for options in (
-            "half-cone --cones=3",
-            "rhumb-line",
-            "rhumb-line --per-turn=2",
-            "rhumb-line --sun 40deg,60deg",
-        )
-    )
-    assert cones["flown"]["axis_error_deg"] < 1e-7
-    assert len(cones["pulses"]) == 4
-    assert turns["flown"]["axis_error_deg"] < 1e-7
-    first, second = (pulse["t_s"] for pulse in turns["pulses"][:2])
-    assert second - first == pytest.approx(math.pi / 3.0, rel=1e-3)
-    assert by_sun["total_impulse_Nms"] > 1.01 * straight["total_impulse_Nms"]
-
-
 # --- a scheme that has a bug
 # ------------------------------------------------------------------------------------------
 

@@ -102,13 +102,6 @@ def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> N
     assert "A|?0|" in ended.stdout
 
 
-def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
-    for command in ("plan", "check", "simulate --scheme two-pulse"):
-        assert not [
-            line for line in call(run, command).stdout.splitlines() if line != line.rstrip()
-        ]
-
-
 # --- disks and signals
 # ------------------------------------------------------------------------------------------------
 
