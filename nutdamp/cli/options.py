@@ -55,7 +55,7 @@ FOLDER = click.Path(readable=False)
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]
-    """What ``read`` makes of a text, of which a ``check`` holds, or of one of ``words``.
+    """The value that ``read`` makes of a text, and a ``check`` holds for, or that of ``words``.
 
     A text that is none is a usage error, by the ValueError of ``read``; one that the check refuses
     by a BadRequest has the error ``problem``.

@@ -322,43 +322,27 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 # --- beside a recommended plan
 
 
-def _better(
-    fronts: Sequence[Front], chosen: Plan, *, misses: bool
-) -> tuple[float, float, TradeRow] | None:
-    """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better
-    than ``chosen``.
-    """
-    until = chosen.pulses.end
-    better = []
-    for row in rows_of(fronts):
-        saved = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit)
-        end = row.pulses.end
-        cheaper = saved > SAME_COST and end <= until
-        able = row.point.verdict.met and not fails(row.point)
-        if able and (misses or cheaper or _sooner(row.point.plan, chosen, saved)):
-            better.append((saved if misses or saved > SAME_COST else 0.0, until - end, row))
-    return max(better, key=itemgetter(0, 1), default=None)
-
-
-def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
-    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H
-    about as near.
-    """
-    shifts = [flown._flight.residual.axis_error for flown in (plan, chosen)]
-    ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
-    return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
-
-
 def trade_notes(
     fronts: Sequence[Front], chosen: Plan, judged: Verdict, craft: str = "SPACECRAFT"
 ) -> Iterator[Note]:
     """The schedule of a front that is better than the ``chosen`` plan, with its command for the
     words ``craft`` of a spacecraft; or that costs more.
     """
-    better = _better(fronts, chosen, misses=judged.met is False)
-    if better is not None:
-        row = better[2]
-        shift = better[2].front.shift
+    misses = judged.met is False
+    error = chosen._flight.residual.axis_error
+    better = []
+    for row in rows_of(fronts):
+        saved = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit)
+        earlier = chosen.pulses.end - row.pulses.end
+        cheaper = saved > SAME_COST and earlier >= 0.0
+        near = row.residual.axis_error <= FARTHER * error + SAME_ANGLE
+        sooner = abs(saved) <= SAME_COST and earlier > SOONER * chosen.pulses.end and near
+        able = row.point.verdict.met and not fails(row.point)
+        if able and (misses or cheaper or sooner):
+            better.append((saved if misses or cheaper else 0.0, earlier, row))
+    if better:
+        _, _, row = max(better, key=itemgetter(0, 1))
+        shift = row.front.shift
         aim = "--free-axis " if math.isinf(shift) else ""
         if 0.0 < shift < math.inf:
             aim = f'--shift "{degrees(shift)}" '
@@ -366,10 +350,12 @@ def trade_notes(
         plan = " ".join(filter(None, ("nutdamp plan", craft)))
         command = f"{plan} --scheme {row.point.plan.scheme} {aim}{horizon}"
         shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
-        if judged.met is False:
-            yield note("trade-meets", point=row.number, command=command, **shown)
-        else:
-            yield note("trade-better", point=row.number, command=command, **shown)
+        yield note(
+            "trade-meets" if misses else "trade-better",
+            point=row.number,
+            command=command,
+            **shown,
+        )
     rows = [
         row
         for row in rows_of(fronts)

@@ -388,12 +388,6 @@ def test_of_spin_changes_the_size_is_shown_and_files_have_the_sign(
     assert (signed["min"], signed["max"]) == pytest.approx((changes.min(), changes.max()))
 
 
-def test_one_case_has_the_nominal_one_of_all(run: Run) -> None:
-    for number in (["--samples", "100"], ["--case", "7"]):
-        shift = row_of(run("disperse", "--scheme", "four-pulse", *number).stdout, "momentum shift")
-        assert shift[0] == 0.1684
-
-
 @pytest.mark.weekly
 @pytest.mark.parametrize("number", [signal.SIGINT, weekly(signal.SIGTERM)])
 def test_an_interrupted_run_keeps_what_is_done(

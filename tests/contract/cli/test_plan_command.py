@@ -287,13 +287,6 @@ def planned(run: Run, *arguments: str, status: int = 0) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.deep
-def test_a_robust_plan_is_compared_by_the_same_cases(run: Run) -> None:
-    share = planned(run, "--scheme", "two-pulse")["decision"]["cases"]["met_fraction"]
-    robust = planned(run, "--scheme", "two-pulse", "--robust")["robust"]
-    assert robust["against"]["met_fraction"] == pytest.approx(share)
-
-
 def test_an_undecided_share_does_not_meet(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work, "CASES", 1.0)
     found = planned(run, "--scheme", "two-pulse", status=4)

@@ -25,7 +25,6 @@ from support.process import Run
 from nutdamp.cli import files, job, main
 from nutdamp.cli.studies import stoppable
 from nutdamp.common import work
-from nutdamp.files.reader import example_text
 from nutdamp.planning import plan as planning
 from nutdamp.planning.tradeoff import Front, Point, Trade
 from nutdamp.spacecraft.model import Requirement
@@ -395,20 +394,6 @@ def test_no_si_unit_with_a_us_one_is_left_on_a_screen(run: Run, command: str) ->
 @pytest.mark.parametrize("command", [*of_configs(LONG, FILES), *of_configs(LOOPS, LOOPED), *FITS])
 def test_nor_on_the_screens_of_long_studies(run: Run, command: str) -> None:
     expect_replaced(run, command)
-
-
-def test_tanks_and_tolerances_are_shown_in_us_units(run: Run, tmp_path: Path) -> None:
-    """Pressure and propellant of a tank, and tolerances in their own units."""
-    (tmp_path / "s.yaml").write_text(
-        example_text() + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}\n",
-        encoding="utf-8",
-    )
-    shown = run(
-        "check", "s.yaml", "-v", "--units", "us", "--set", "mass=250 kg", columns=120
-    ).stdout
-    assert re.search(r"^0 +319.1 psi", shown, re.MULTILINE)
-    assert re.search(r"^66.14 +116 psi", shown, re.MULTILINE)
-    assert not SI_UNITS.findall(shown)
 
 
 @pytest.mark.parametrize(
