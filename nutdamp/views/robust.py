@@ -27,6 +27,7 @@ from nutdamp.planning.screening import FlownPlan
 from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
+from nutdamp.views.dispersion import in_words, stated_text
 from nutdamp.views.glance import end_facts, headline, scheme_table
 from nutdamp.views.parts import named, pulse_table, summary
 from nutdamp.views.simulation import blocks_screen
@@ -48,7 +49,6 @@ from nutdamp.views.text import (
     small_angle,
     text,
 )
-from nutdamp.views.tolerances import in_words, stated_text
 from nutdamp.views.verdict import cases_json, exact_percent, percent, share_text
 
 MOST_ROWS = 12  # largest number of candidates in the table
