@@ -167,7 +167,12 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     )
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
-        yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
+        what = "grows" if spacecraft.growth > 0.0 else "decays"
+        slow = spacecraft.dissipation >= spacecraft.inertial_period
+        rough = "" if slow else "; less than one inertial period: results are rough"
+        effect = f"the nutation {what} e-fold in {duration(spacecraft.dissipation)}{rough}"
+        sphere = spacecraft.growth == 0.0
+        yield "dissipation", "none: a sphere has no energy to lose" if sphere else effect
     # Causes that break the floors A|ω0| and C|ω3|β.
     unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
     beyond = " and ".join([*unequal, *changing(spacecraft)])
@@ -195,18 +200,6 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     bounds = required(spacecraft)
     if bounds:
         yield "requirement", bounds
-
-
-def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
-    """Effect of energy dissipation on the nutation,
-    and a note where it is too fast for its model.
-    """
-    if spacecraft.growth == 0.0:
-        return "none: a sphere has no energy to lose"
-    what = "grows" if spacecraft.growth > 0.0 else "decays"
-    slow = time_constant >= spacecraft.inertial_period
-    rough = "" if slow else "; less than one inertial period: results are rough"
-    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
 
 
 def plan_json(plan: Plan) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
 from nutdamp.views.dispersion import in_words, stated_text
-from nutdamp.views.glance import end_facts, headline, scheme_table
+from nutdamp.views.glance import end_facts, glance, headline, scheme_table
 from nutdamp.views.parts import named, pulse_table, summary
 from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
@@ -83,20 +83,25 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     return summary(head, None, notes, "", more=tables, verbose=True)
 
 
-def robust_screen(robust: RobustComparison) -> RenderableType:
-    """All tables of ``plan --robust``."""
+def robust_screen(robust: RobustComparison, *, verbose: bool = True) -> RenderableType:
+    """The screen of ``plan --robust``; ``verbose``: with all tables."""
+    if not verbose:
+        return glance(robust.joined, robust_notes(robust))
+    shown = comparison_screen(robust.joined)
+    if robust.chosen is None:
+        return shown
+    rows = list(robust.candidates[:MOST_ROWS])
+    rows += [entry for entry in (robust.chosen, robust.usual) if entry and entry not in rows]
+    below = f"Plans below these: {len(robust.candidates) - len(rows)}; * without --robust."
+    name = f"{robust.chosen.plan.scheme}, {robust.chosen.variant}"
     reason = joined(robust_reasons(robust))
-    parts: list[RenderableType] = [comparison_screen(robust.joined)]
-    if robust.chosen is not None:
-        named = f"{robust.chosen.plan.scheme}, {robust.chosen.variant}"
-        parts += [
-            Text(),
-            Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
-            *map(Text, _fresh(robust)),
-            *map(screen_line, robust_notes(robust)),
-            *(Text(), *_candidates(robust)),
-        ]
-    return Group(*parts)
+    return Group(
+        shown,
+        *(Text(), Text.assemble("Robust plan: ", (name, "bold"), f" – {reason}.")),
+        *map(Text, _fresh(robust)),
+        *map(screen_line, robust_notes(robust)),
+        *(Text(), _table(robust, rows).screen("full"), Text(below, style="dim")),
+    )
 
 
 def robust_notes(robust: RobustComparison) -> list[Note]:
@@ -218,15 +223,6 @@ def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
         Column("final", "", "", lambda row: final_json(row.plan._flight), where="json"),
     ]
     return DataTable("Candidates", columns, candidates, robust, mark)
-
-
-def _candidates(robust: RobustComparison) -> list[RenderableType]:
-    named = list(robust.candidates[:MOST_ROWS])
-    named += [
-        entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named
-    ]
-    below = f"Plans below these: {len(robust.candidates) - len(named)}; * without --robust."
-    return [_table(robust, named).screen("full"), Text(below, style="dim")]
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:

@@ -109,22 +109,21 @@ def simulation_screen(
     ]
     head += [verdicts.bound_table(judged).screen("screen")] if judged.lines else []
     ends = _end_table(simulation)
+    verify = "nutdamp verify"
+    if simulation.plan._from_file:
+        kind = "blocks" if simulation.plan.pulses.blocks else "schedule"
+        verify += f" --{kind} {shlex.quote(simulation.plan.scheme)}"
+    until = moment(extremes.until)
+    track = f"{extremes.rows} rows, 0 to {until}, by the {simulation.shown.model}"
+    watched = parts.aspect_facts(aspects(simulation.shown, extremes.until)) if verbose else ()
     return parts.summary(
         head,
-        lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
+        lambda **_: ends.transposed("screen", f"end of track, {until}"),
         [*_notes(simulation), *planned],
-        parts.STEP.join(["--csv track.csv", "--plot motion.png", _verified(simulation.plan)]),
-        more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
+        parts.STEP.join(["--csv track.csv", "--plot motion.png", verify]),
+        more=[*_fired(simulation), facts([*watched, ("track", track)])] if verbose else (),
         verbose=verbose,
     )
-
-
-def _verified(plan: Plan) -> str:
-    """The command that verifies the schedule of a file, or the recommended plan."""
-    if not plan._from_file:
-        return "nutdamp verify"
-    kind = "blocks" if plan.pulses.blocks else "schedule"
-    return f"nutdamp verify --{kind} {shlex.quote(plan.scheme)}"
 
 
 def _notes(simulation: Simulation) -> Iterator[Note]:
@@ -204,13 +203,6 @@ def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
     # a track may end before the last one
     rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
     return replace(table, rows=rows)
-
-
-def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
-    extremes = simulation.extremes
-    yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
-    model = simulation.shown.model
-    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}, by the {model}"
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
