@@ -35,6 +35,17 @@ def spinning(value: float) -> str:
     return table(f"t_s,omega_1_{unit},omega_3_{unit}", sway)
 
 
+MARKUP = """
+name: "[red]Evil[/] [/] :rocket:"
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters:
+  - {name: "[red]", torque: [8, 0, 0]}
+  - {name: "[/]", torque: [0, 8, 0]}
+  - {name: ":rocket:", torque: [-8, 0, 0]}
+dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
+"""
+"""Names that look like markup or emoji are shown as they are."""
 TABLE = (Path(__file__).parent / "commands.txt").read_text(encoding="utf-8").split("\n=== ")[1:]
 SAID = (
     r"ENOUGH|PLAN|warning|equirement|≤|infeasible|cannot|does not|needs|least impulse|there is no"
@@ -52,6 +63,7 @@ FILES = {
     "own_csv": SCHEDULE.replace(",channel", "").replace("1,0,steerable,4", "1,0,-5")
     + "2,0.5,0,4,0\n",
     "old_csv": "old",
+    "markup_yaml": MARKUP,
 }
 
 
