@@ -33,10 +33,6 @@ def crafts(tmp_path: Path) -> None:
     written(tmp_path, **CRAFTS)
 
 
-def settings(*each: str) -> list[str]:
-    return [part for setting in each for part in ("--set", setting)]
-
-
 def table(path: Path) -> list[dict[str, str]]:
     return rows(path.read_text())
 

@@ -219,12 +219,6 @@ def test_what_is_not_installed_is_exit_1_with_the_cure_before_the_work(
 # --------------------------------------------------------------------------------------------------
 
 
-def page_of(folder: Path) -> str:
-    return parsed((folder / "report.html").read_text(encoding="utf-8")).text.replace(
-        "\N{NO-BREAK SPACE}", " "
-    )
-
-
 def verdict_of(folder: Path, kind: str) -> str:
     """The decision on the page, which is of that kind: met, caution or missed."""
     tree = parsed((folder / "report.html").read_text(encoding="utf-8"))

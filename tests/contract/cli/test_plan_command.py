@@ -277,9 +277,6 @@ def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(
 # --- what is recommended: dispersed cases, command blocks, needless pulses, spin changes, free H
 
 
-QUICK = ("--scheme", "two-pulse", "--scheme", "four-pulse")
-
-
 def planned(run: Run, *arguments: str, status: int = 0) -> dict[str, Any]:
     """The JSON of ``plan``."""
     found: dict[str, Any] = json.loads(run("plan", "--json", "-", *arguments, status=status).stdout)
