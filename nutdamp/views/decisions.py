@@ -34,6 +34,7 @@ from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.units import screen_unit
 from nutdamp.views.parts import (
+    RESIDUALS,
     aspect_facts,
     changing,
     commanded,
@@ -268,14 +269,7 @@ def direction_json(spacecraft: Spacecraft, direction: Vector) -> dict[str, float
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
     """Cone angles and shifts in degrees; nulls where there is no schedule."""
-    return values_of(
-        residual,
-        "nutation_deg",
-        "body_cone_deg",
-        "space_cone_deg",
-        "momentum_shift_deg",
-        "axis_error_deg",
-    )
+    return values_of(residual, *(f"{name}_deg" for name in RESIDUALS))
 
 
 def decision_json(judged: Verdict) -> dict[str, Any]:

@@ -64,6 +64,10 @@ if TYPE_CHECKING:
 MILLISECONDS = 3  # digits of a second that tables show of a date
 
 
+RESIDUALS = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
+"""Angles that are left, as `Residual` has them; the last one with a target."""
+
+
 class PulseRow(NamedTuple):
     """A pulse of the ``spacecraft``, counted from 0; motion just before and after all pulses; spin
     phase at its start, rad.

@@ -72,9 +72,7 @@ def _end_table(simulation: Simulation) -> DataTable:
         name = MODELS[flight.model]
         return f"{name}, track" if flight.model == simulation.shown.model else name
 
-    residuals = ["nutation", "body_cone", "space_cone", "momentum_shift"]
-    if spacecraft.goal.axis is not None:
-        residuals.append("axis_error")
+    residuals = parts.RESIDUALS[: None if spacecraft.goal.axis is not None else -1]
     columns = [
         Column("", "model", "", model, where="screen", kind=TEXT),
         *(

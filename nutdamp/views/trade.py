@@ -104,7 +104,8 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
         return fixed(100.0 * (row.point.cost / first.point.cost - 1.0), 1)
 
     columns = [
-        Column.named("point=number", "point", "", where=everywhere, kind=WHOLE),
+        Column.named("point=number", "point", "", where=f"{everywhere} json-head", kind=WHOLE),
+        *file_columns("json-head", "horizon_s=point.horizon"),
         Column.named(
             "shift_allowed_deg=front.shift", "H within", "deg", within, "csv brief", rank=2
         ),
@@ -144,9 +145,9 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             where=everywhere if others else "csv",
             kind=TEXT,
         ),
-        Column.named("status=point.verdict.status.value", "", "", where="csv", kind=TEXT),
-        *file_columns("csv", "share=point.verdict.cases.complying"),
-        Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
+        Column.named("status=point.verdict.status.value", "", "", where="csv json", kind=TEXT),
+        *file_columns("csv json", "share=point.verdict.cases.complying"),
+        Column("meets_requirement", "", "", met, where="csv json", kind=YES_NO),
         Column(
             "", "comply", "", attrgetter("point.verdict.cases"), share_text, shown if flown else ""
         ),
@@ -292,17 +293,17 @@ def trade_json(traded: Trade) -> dict[str, Any]:
     """All fronts with their plans, in the form of ``plan --json``."""
     entries = []
     for front in traded.fronts:
-        rows = [row for row in rows_of(traded.fronts) if row.front is front]
+        table = _table([row for row in rows_of(traded.fronts) if row.front is front])
         points = [
             {
-                **values_of(row, "point=number", "horizon_s=point.horizon"),
+                **head,
                 **plan_json(row.point.plan),
-                "status": row.point.verdict.status.value,
-                "meets_requirement": row.point.verdict.met,
-                **values_of(row, "share=point.verdict.cases.complying"),
+                **judged,
                 "decision": verdict_json(row.point.verdict),
             }
-            for row in rows
+            for row, head, judged in zip(
+                table.rows, table.json("json-head"), table.json(), strict=True
+            )
         ]
         entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
     return {**heading(traded.spacecraft), "fronts": entries}
