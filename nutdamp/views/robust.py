@@ -15,12 +15,7 @@ from rich.text import Text
 from nutdamp.common.results import Note, note
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import (
-    alternatives,
-    comparison_warnings,
-    plan_notes,
     reasons,
-    spacecraft_notes,
-    verdict_notes,
 )
 from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
 from nutdamp.planning.screening import FlownPlan
@@ -28,7 +23,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
 from nutdamp.views.dispersion import in_words, stated_text
-from nutdamp.views.glance import end_facts, glance, headline, scheme_table
+from nutdamp.views.glance import end_facts, glance, headline, notes, scheme_table
 from nutdamp.views.parts import named, pulse_table, summary
 from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
@@ -59,7 +54,6 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     judged, chosen = compared.verdict, compared.recommended
     head: list[RenderableType] = [named(compared.spacecraft), headline(compared)]
     tables: list[RenderableType] = []
-    notes = [*spacecraft_notes(compared.spacecraft)]
     if chosen is not None:
         head.append(Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]))
         head.append(Text(sentence(f"{chosen.scheme}: {joined(reasons(compared))}")))
@@ -67,8 +61,6 @@ def comparison_screen(compared: Comparison) -> RenderableType:
             spent = verdicts.spent(cheaper.schedule)
             head.append(Text(f"cheaper: {cheaper.scheme}, {spent}, {text(cheaper.why)}", "dim"))
         tables = [verdicts.bound_table(judged).screen("screen"), end_facts(chosen)]
-        notes = [*comparison_warnings(compared, tabulated=True), *notes]
-        notes += [*verdict_notes(judged, chosen), *alternatives(compared)]
     tables.append(derived_table(compared.spacecraft))
     tables.append(scheme_table(compared, chosen).transposed("full"))
     if chosen is not None and chosen.pulses.blocks:
@@ -79,8 +71,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
             totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
         on_times = ((f"on-time of {name}", f"{total:.4f} s") for name, total in totals.items())
         tables += [pulse_table(chosen._flight).screen("full"), facts(on_times)]
-    notes += [note for plan in compared.plans for note in plan_notes(plan)]
-    return summary(head, None, notes, "", more=tables, verbose=True)
+    return summary(head, None, notes(compared, verbose=True), "", more=tables, verbose=True)
 
 
 def robust_screen(robust: RobustComparison, *, verbose: bool = True) -> RenderableType:
