@@ -65,7 +65,7 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
         self,
         name: str,
         read: Callable[[Any], Any],
-        check: Callable[[Any], object] = id,
+        check: Callable[[Any], object] = id,  # any value passes
         problem: str = "",
         **words: object,
     ) -> None:

@@ -20,6 +20,8 @@ from support.loops import follow_few_cycles
 from support.process import Run, unpictured
 from support.shown import parsed
 
+from nutdamp.schemes.catalogue import NAMES
+
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 
@@ -50,6 +52,7 @@ TABLE = (Path(__file__).parent / "commands.txt").read_text(encoding="utf-8").spl
 SAID = (
     r"ENOUGH|PLAN|warning|equirement|≤|infeasible|cannot|does not|needs|least impulse|there is no"
 )
+TWICE = re.compile(rf"\b({'|'.join(NAMES)}):? ?\1: ")  # a scheme that is named twice
 MARKS = {"deep": deep, "weekly": weekly}
 RATES = "t_s,omega_1_rad_s,omega_3_rad_s"
 UNITS = {"180": 180.0, "30": 30.0, "314": math.pi, "-30": -30.0, "017": math.pi**2 / 180.0}
@@ -123,9 +126,11 @@ def test_commands(
         assert "Traceback" not in ended.stderr
         assert (ended.returncode, row) == (int(status), row), ended.stderr
         assert not re.search(" $", ended.stdout, re.MULTILINE), row  # no blanks fill up lines
+        assert not TWICE.search(f"{ended.stdout}\n{ended.stderr}"), row
         assert paths or not re.search(r"…(?! +\d+ more)", ended.stdout), row  # no value is cut
         if page is not None:
             told = said_on((tmp_path / "report.html").read_text(encoding="utf-8"))
+            assert not TWICE.search(told), row
             texts = [*dict.fromkeys(re.findall(page, told))]
         elif paths:
             data = json.loads(ended.stdout)
