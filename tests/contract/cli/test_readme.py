@@ -512,7 +512,7 @@ SCREENS = ("cli.budget", "cli.check", "cli.disperse", "cli.loop", "cli.nothing",
            "cli.simulate", "glance", "loop.full", "loop.screen", "files.blocks-screen")  # fmt: skip
 OWN_NAMES = {"Sounder-1", "Sounder-1 (built-in example)", "Good", "Sat", "Tilted", "Upper", "T1",
          "+", "-", "+M1", "-M1", "+M2", "-M2", "Dated", "Weak",
-             "ZeroDivisionError", "ZXZ", "ZZX"}  # fmt: skip
+             "ZeroDivisionError", "ZXZ", "ZZX", "ICE"}  # fmt: skip
 """Names of spacecraft and channels in the files of those screens."""
 
 
