@@ -446,10 +446,10 @@ class DefaultScreen:
             parts = [part for part in every if blanks or not isinstance(part, Text) or part.plain]
             if lines_of(*parts, width=width) <= limit:
                 break
-        fitting = [part for part in parts if isinstance(part, FittedColumns)]
-        for table in () if self.silent else fitting:
-            table.told = True
-            table.told = lines_of(*parts, width=width) <= limit
+        for part in parts:
+            if isinstance(part, FittedColumns) and part.left_out(width) and not self.silent:
+                part.told = True
+                part.told = lines_of(*parts, width=width) <= limit
         yield Group(*parts)
 
     def _parts(self, rows: int, count: int, width: int) -> list[RenderableType]:

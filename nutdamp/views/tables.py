@@ -91,16 +91,25 @@ class FittedColumns(Table):
     shortened = False
     told = False
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        every, room = list(self.columns), options.max_width
-        texts = [[_plain_text(column.header), *map(_plain_text, column.cells)] for column in every]
-        shown = list(range(len(every)))
+    def texts(self) -> list[list[str]]:
+        """Heading and cells of each column."""
+        return [[_plain_text(each.header), *map(_plain_text, each.cells)] for each in self.columns]
+
+    def left_out(self, room: int) -> list[int]:
+        """Places of the columns that ``room`` characters leave out."""
+        texts = self.texts()
+        shown = list(range(len(texts)))
         while self.shortened and not fitted([texts[at] for at in shown], room, words=False):
             ranked = max(shown, key=self.ranks.__getitem__)
             if not self.ranks[ranked]:
                 break
             shown.remove(ranked)
-        left_out = [" ".join(texts[at][0].split()) for at in range(len(every)) if at not in shown]
+        return [at for at in range(len(texts)) if at not in shown]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        every, texts, room = list(self.columns), self.texts(), options.max_width
+        left_out = self.left_out(room)
+        shown = [at for at in range(len(every)) if at not in left_out]
         while shown:
             count = len(shown)
             while count > 2 and not fitted([texts[at] for at in shown[:count]], room):
@@ -118,7 +127,8 @@ class FittedColumns(Table):
             shown = [0, *below] if below else []
         self.columns = every
         if self.told and left_out:
-            words, cure = f"left out: {', '.join(left_out)}", " (-v or a wider screen)"
+            names = (" ".join(texts[at][0].split()) for at in left_out)
+            words, cure = f"left out: {', '.join(names)}", " (-v or a wider screen)"
             yield Text(words + cure if len(words + cure) <= room else words, style="dim")
 
 
