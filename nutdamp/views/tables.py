@@ -107,7 +107,9 @@ class FittedColumns(Table):
         return [at for at in range(len(texts)) if at not in shown]
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        every, texts, room = list(self.columns), self.texts(), options.max_width
+        every = list(self.columns)
+        texts = self.texts()
+        room = options.max_width
         left_out = self.left_out(room)
         shown = [at for at in range(len(every)) if at not in left_out]
         while shown:
@@ -128,7 +130,8 @@ class FittedColumns(Table):
         self.columns = every
         if self.told and left_out:
             names = (" ".join(texts[at][0].split()) for at in left_out)
-            words, cure = f"left out: {', '.join(names)}", " (-v or a wider screen)"
+            words = f"left out: {', '.join(names)}"
+            cure = " (-v or a wider screen)"
             yield Text(words + cure if len(words + cure) <= room else words, style="dim")
 
 
