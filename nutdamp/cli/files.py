@@ -37,11 +37,11 @@ from nutdamp.cli.main import (
     tell,
 )
 from nutdamp.cli.options import (
+    COUNT,
     END,
     FILE,
     OF_RECORD,
     OUTPUT,
-    Count,
     Grouped,
     NameType,
     goal_options,
@@ -445,7 +445,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 )
 @click.option(
     "--disperse",
-    type=Count(),
+    type=COUNT,
     is_flag=False,
     flag_value=SAMPLES,
     metavar="[N]",

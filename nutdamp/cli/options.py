@@ -54,88 +54,71 @@ OUTPUT = OutputName()
 FOLDER = click.Path(readable=False)
 
 
-class UnitType(click.ParamType):  # type: ignore[type-arg]
-    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or
-    one of ``words``.
+class Parsed(click.ParamType):  # type: ignore[type-arg]
+    """The value that ``read`` makes of a text, and a ``check`` holds for, or that of ``words``.
+
+    A text that is none is a usage error, by the ValueError of ``read``; one that the check refuses
+    by a BadRequest has the error ``problem``.
     """
 
     def __init__(
         self,
-        kind: str,
-        check: Callable[[float], object] = float,
+        name: str,
+        read: Callable[[Any], Any],
+        check: Callable[[Any], object] = id,  # any value passes
         problem: str = "",
-        **words: float | str,
+        **words: object,
     ) -> None:
-        self.name = kind
-        self.kind, self.check, self.problem, self.words = kind, check, problem, words
+        self.name, self.read, self.words = name, read, words
+        self.check, self.problem = check, problem
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """The SI value, or that of a word; a usage error for anything else."""
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value; a usage error for anything else."""
         if value in self.words:
-            return self.words[value]  # type: ignore[return-value]
+            return self.words[value]
         try:
-            number = units.word(value, self.kind)
-            self.check(number)
+            parsed = self.read(value)
+            self.check(parsed)
         except ValueError as wrong:
             self.fail(str(wrong), param, ctx)
         except BadRequest:
             self.fail(self.problem, param, ctx)
-        return number
+        return parsed
 
 
-END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
-OF_RECORD = UnitType(
+def quantity(
+    kind: str, check: Callable[[float], object] = float, problem: str = "", **words: float | str
+) -> Parsed:
+    """A number in SI or a text with a unit, as in a spacecraft file."""
+    return Parsed(kind, functools.partial(units.word, kind=kind), check, problem, **words)
+
+
+def direction(
+    check: Callable[[list[Angles]], object] = len, problem: str = "", kind: str = "angle"
+) -> Parsed:
+    """Two angles with a comma between them, the first of a ``kind``, in rad."""
+    read = functools.partial(units.angles, kind=kind)
+    return Parsed("angle,angle", read, lambda pair: check([pair]), problem)
+
+
+def _count(text: str) -> int:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not (1.0 <= number <= 1e12 and number.is_integer()):
+        raise ValueError(f"{text} is not a number of cases: 1 or more, such as 100000 or 1e6")
+    return int(number)
+
+
+COUNT = Parsed("n", _count)
+"""A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
+END = quantity("time", units.end_of_flight, "expected a time after t = 0")
+OF_RECORD = quantity(
     "time",
     lambda time: units.expect(time >= 0.0, "at", time, ""),
     "expected the time after the first record, 0 or more, such as 0s or 12.5s",
 )
-
-
-class Direction(click.ParamType):  # type: ignore[type-arg]
-    """Two angles with a comma between them, the first of a ``kind``, of which a ``check`` holds."""
-
-    name = "angle,angle"
-
-    def __init__(
-        self,
-        check: Callable[[list[Angles]], object] = len,
-        problem: str = "",
-        kind: str = "angle",
-    ) -> None:
-        self.check, self.problem, self.kind = check, problem, kind
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Angles:
-        """Both in rad; a usage error for anything else."""
-        try:
-            direction = units.angles(value, self.kind)
-            self.check([direction])
-        except ValueError as wrong:
-            self.fail(str(wrong), param, ctx)
-        except BadRequest:
-            self.fail(self.problem, param, ctx)
-        return direction
-
-
-class Count(click.ParamType):  # type: ignore[type-arg]
-    """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
-
-    name = "n"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """The number; a usage error for anything else."""
-        try:
-            number = float(value)
-        except ValueError:
-            number = 0.0
-        if not (1.0 <= number <= 1e12 and number.is_integer()):
-            self.fail(
-                f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx
-            )
-        return int(number)
 
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -159,19 +142,19 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
     """The goal, and the options of every scheme; with ``several`` one with a bug is passed over."""
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
     angles = functools.partial(
-        option, type=Direction(kind="right ascension"), metavar="ANGLE,ANGLE"
+        option, type=direction(kind="right ascension"), metavar="ANGLE,ANGLE"
     )
     command = debug_option(command) if several else command
     disturbed = "Plan on the motion with the disturbances of the file."
     command = option("--with-disturbances", is_flag=True, help=disturbed)(command)
     if several:
         command = angles("--sun", help="The Sun, as --target; rhumb-line keeps its phase.")(command)
-    rate = UnitType("rate", keep="keep")
+    rate = quantity("rate", keep="keep")
     spin = "Final spin rate, such as 30rpm; optimal can set it."
     command = option("--spin", type=rate, metavar="RATE|keep", help=spin)(command)
     end = "Axis at the end: RA,DEC; no attitude: tilt,azimuth."
     from_sun = "Instead of --target: its angle from the Sun: 109deg."
-    command = option("--sun-angle", type=UnitType("angle"), metavar="ANGLE", help=from_sun)(command)
+    command = option("--sun-angle", type=quantity("angle"), metavar="ANGLE", help=from_sun)(command)
     return angles("--target", help=end)(command)
 
 
@@ -184,7 +167,7 @@ def scheme_options(command: Command) -> Command:
             value = (
                 NameType(kind.names)
                 if kind.names
-                else UnitType(kind.unit)
+                else quantity(kind.unit)
                 if kind.unit
                 else click.IntRange(1)
             )

@@ -209,10 +209,8 @@ def _screen(
 
     if dispersed is None and not verbose:
         return glance(compared)
-    from nutdamp.views.robust import comparison_screen, robust_notes, robust_screen
+    from nutdamp.views.robust import comparison_screen, robust_screen  # fewer modules for a glance
 
     if dispersed is None:
         return comparison_screen(compared)
-    if verbose:
-        return robust_screen(dispersed)
-    return glance(dispersed.joined, robust_notes(dispersed))
+    return robust_screen(dispersed, verbose=verbose)

@@ -31,17 +31,17 @@ from nutdamp.cli.job import (
 )
 from nutdamp.cli.main import Terminated, leave, say, show_failures
 from nutdamp.cli.options import (
+    COUNT,
     END,
     FILE,
     FOLDER,
     OUTPUT,
     Command,
-    Count,
-    Direction,
     NameType,
-    UnitType,
+    direction,
     expect_read,
     goal_options,
+    quantity,
 )
 from nutdamp.cli.plan import compared_with, scheme_option
 from nutdamp.common.work import SAMPLES
@@ -241,7 +241,7 @@ def simulate_command(
 @spacecraft_argument
 @click.option(
     "--allow",
-    type=UnitType(
+    type=quantity(
         "angle",
         lambda shift: shifts([shift]),
         "expected an angle of at least 0, or any",
@@ -326,7 +326,7 @@ def trade_command(
 @defaulted("--seed", click.IntRange(0, LARGEST_SEED), 1, "Of the noise of the sensor.")
 @click.option(
     "--case",
-    type=Count(),
+    type=COUNT,
     help="Fly this dispersed case, as `disperse --loop` does with that seed.",
 )
 @defaulted("--samples", click.IntRange(2, 10_000_000), 1000, "Rows of the track.")
@@ -381,7 +381,7 @@ def loop_command(
 @click.option(
     "--thresholds",
     "pairs",
-    type=Direction(
+    type=direction(
         thresholds, "expected START above STOP, both below 90 deg, such as 0.5deg,0.1deg"
     ),
     multiple=True,
@@ -393,7 +393,7 @@ def loop_command(
 )
 @click.option(
     "--largest",
-    type=UnitType("angle", tilt, "expected an angle between 0 and 90 deg"),
+    type=quantity("angle", tilt, "expected an angle between 0 and 90 deg"),
     help="By which damping must begin; default: requirement.nutation.",
 )
 @defaulted("--seed", click.IntRange(0), 1, "Of the noise of the sensor.")
@@ -438,7 +438,7 @@ def budget_command(
 )
 @click.option(
     "--at",
-    type=UnitType("time"),
+    type=quantity("time"),
     default=0.0,
     help="Show and write the motion at this time; default 0 s.",
 )
@@ -547,7 +547,7 @@ def stoppable() -> Iterator[Interruption]:
 @goal_options
 @click.option(
     "--samples",
-    type=Count(),
+    type=COUNT,
     show_default=f"{SAMPLES}; of --loop what shows the share required, 2000 or more",
     help="Dispersed cases to fly.",
 )
@@ -562,7 +562,7 @@ def stoppable() -> Iterator[Interruption]:
 @click.option(
     "--until", type=END, help="End of --loop; default: the horizon after the nutation is at start."
 )
-@click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
+@click.option("--case", type=COUNT, help="Show this one case alone, with all its inputs.")
 @defaulted("--worst", click.IntRange(0, 1000), 5, "Worst cases with -v.", metavar="N")
 @click.option(
     "--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones."

@@ -234,11 +234,10 @@ def _warn_of_contradictions(row: Row, pulse: Pulse, axes: Vector) -> None:
     for column, value, size in follows:
         stated = row.number(column) if row.get(column) else None
         if stated is not None and abs(stated - value) > CONTRADICTS * size:
-            row.warn(
-                column,
-                f"{column} {row[column]} is ignored, {value:.6g} follows: start, on-time and "
-                "channel rule",
-            )
+            rule = "start, on-time and channel rule"
+            row.warn(column, f"{column} {row[column]} is ignored, {value:.6g} follows: {rule}")
+            if column in TORQUE:
+                return  # another torque has another impulse too
 
 
 def read_plan(

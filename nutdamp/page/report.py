@@ -346,7 +346,8 @@ def _sections(
     if dispersed is not None:
         yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
     if traded:
-        yield PageSection("trade", "Time against cost", tuple(_trade(compared, traded)))
+        craft = repeat.craft(built_in=compared.spacecraft.built_in)
+        yield PageSection("trade", "Time against cost", tuple(_trade(compared, traded, craft)))
     if chosen is not None:
         title = f"Manoeuvre sheet: {compared.spacecraft.name}, {chosen.scheme}"
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
@@ -417,16 +418,17 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
     rows = [("", note) for note in more_notes]
     for plan in compared.plans:
         if plan.feasible and plan is not chosen:
-            rows += [(plan.scheme, text(note)) for note in plan_notes(plan)]
+            told = (text(note).removeprefix(f"{plan.scheme}: ") for note in plan_notes(plan))
+            rows += [(plan.scheme, words) for words in told]
     if rows:
         yield Details("Notes on the schemes", (Points(tuple(rows)),))
 
 
-def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
+def _trade(compared: Comparison, traded: Sequence[Front], craft: str) -> Iterator[Block]:
     if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
         yield trade_picture(compared, traded)
     chosen = compared.recommended
-    notes = () if chosen is None else trade_notes(traded, chosen, compared.verdict)
+    notes = () if chosen is None else trade_notes(traded, chosen, compared.verdict, craft)
     yield from (Prose(sentence(text(note))) for note in notes)
     yield from document.blocks_of(
         "Schedules by their ends", Group(*front_parts(compared.spacecraft, traded))

@@ -32,6 +32,7 @@ from nutdamp.views.decisions import (
     direction_json,
     spacecraft_json,
 )
+from nutdamp.views.dispersion import correlation_json, in_words, size_text, unused_notes
 from nutdamp.views.guide import Topic
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.parts import (
@@ -57,7 +58,6 @@ from nutdamp.views.text import (
     small_angle,
     vector,
 )
-from nutdamp.views.tolerances import correlation_json, in_words, size_text, unused_notes
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:

@@ -34,6 +34,7 @@ from nutdamp.planning.verdict import Verdict, lines_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.units import screen_unit
 from nutdamp.views.parts import (
+    RESIDUALS,
     aspect_facts,
     changing,
     commanded,
@@ -167,7 +168,12 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     )
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
-        yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
+        what = "grows" if spacecraft.growth > 0.0 else "decays"
+        slow = spacecraft.dissipation >= spacecraft.inertial_period
+        rough = "" if slow else "; less than one inertial period: results are rough"
+        effect = f"the nutation {what} e-fold in {duration(spacecraft.dissipation)}{rough}"
+        sphere = spacecraft.growth == 0.0
+        yield "dissipation", "none: a sphere has no energy to lose" if sphere else effect
     # Causes that break the floors A|ω0| and C|ω3|β.
     unequal = [] if inertia.symmetric else ["I1 ≠ I2"]
     beyond = " and ".join([*unequal, *changing(spacecraft)])
@@ -195,18 +201,6 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     bounds = required(spacecraft)
     if bounds:
         yield "requirement", bounds
-
-
-def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
-    """Effect of energy dissipation on the nutation,
-    and a note where it is too fast for its model.
-    """
-    if spacecraft.growth == 0.0:
-        return "none: a sphere has no energy to lose"
-    what = "grows" if spacecraft.growth > 0.0 else "decays"
-    slow = time_constant >= spacecraft.inertial_period
-    rough = "" if slow else "; less than one inertial period: results are rough"
-    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
 
 
 def plan_json(plan: Plan) -> dict[str, Any]:
@@ -275,14 +269,7 @@ def direction_json(spacecraft: Spacecraft, direction: Vector) -> dict[str, float
 
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
     """Cone angles and shifts in degrees; nulls where there is no schedule."""
-    return values_of(
-        residual,
-        "nutation_deg",
-        "body_cone_deg",
-        "space_cone_deg",
-        "momentum_shift_deg",
-        "axis_error_deg",
-    )
+    return values_of(residual, *(f"{name}_deg" for name in RESIDUALS))
 
 
 def decision_json(judged: Verdict) -> dict[str, Any]:

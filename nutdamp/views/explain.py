@@ -75,6 +75,10 @@ def explained(
         if not texts and not keys:
             if section := next(_sections(wanted), None):
                 return section
+            parts = requested.split(": ")  # such as "spin axis: tilt"
+            rows = [(part, text) for part in parts for _, text in islice(_texts(part), 1)]
+            if len(rows) == len(parts) > 1:
+                return Topic(requested, " of ".join(parts[::-1]), _listed(rows))
             if own := next(named(requested), None):
                 return own
             if guide.NUMBER.fullmatch(requested.strip().casefold()):

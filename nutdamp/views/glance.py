@@ -339,19 +339,20 @@ def steps(plan: Plan | None) -> Iterator[str]:
     yield "nutdamp report"
 
 
-def notes(compared: Comparison, *, robust: bool = False) -> list[Note]:
+def notes(compared: Comparison, *, robust: bool = False, verbose: bool = False) -> list[Note]:
     """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others
-    miss.
+    miss. ``verbose``: with those on every plan compared.
     """
     chosen = compared.recommended
-    infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
+    plans = [plan for plan in compared.plans if verbose or not plan.feasible]
+    of_plans = [note for plan in plans for note in plan_notes(plan)]
     before = spacecraft_notes(compared.spacecraft)
     if chosen is None:
-        return ordered([*before, *infeasible])
-    own = plan_notes(chosen, cones=False)
+        return ordered([*before, *of_plans])
+    own = () if verbose else plan_notes(chosen, cones=False)
     missed = () if robust else comparison_warnings(compared, tabulated=True)
     beside = verdict_notes(compared.verdict, chosen)
-    return ordered([*missed, *before, *beside, *alternatives(compared), *infeasible, *own])
+    return ordered([*missed, *before, *beside, *alternatives(compared), *of_plans, *own])
 
 
 def headline(compared: Comparison) -> Text:

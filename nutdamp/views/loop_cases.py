@@ -22,14 +22,12 @@ from nutdamp.control_loop.simulation import FlownLoops
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, share_interval
 from nutdamp.views import decisions, dispersion
-from nutdamp.views.dispersion import CaseRow, StudyOutput, case_row
-from nutdamp.views.loop import described
-from nutdamp.views.parts import named, summary
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared
-from nutdamp.views.text import degrees, duration, screen_line
-from nutdamp.views.tolerances import (
+from nutdamp.views.dispersion import (
     MAIN,
     MOST_ROWS,
+    CaseRow,
+    StudyOutput,
+    case_row,
     correlation_json,
     in_words,
     inputs_table,
@@ -37,6 +35,10 @@ from nutdamp.views.tolerances import (
     size_text,
     unused_notes,
 )
+from nutdamp.views.loop import described
+from nutdamp.views.parts import named, summary
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared
+from nutdamp.views.text import degrees, duration, screen_line
 from nutdamp.views.verdict import percent, verdict_json
 
 SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -61,6 +62,10 @@ if TYPE_CHECKING:
     from nutdamp.flight.cones import Aspect
 
 MILLISECONDS = 3  # digits of a second that tables show of a date
+
+
+RESIDUALS = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
+"""Angles that are left, as `Residual` has them; the last one with a target."""
 
 
 class PulseRow(NamedTuple):
@@ -379,14 +384,7 @@ def summary(
     """
     ranked = sorted(ordered(notes), key=rank)
     if not verbose:
-        return DefaultScreen(
-            head,
-            table,
-            ranked,
-            [with_file(step) for step in steps.split(STEP)],
-            lines,
-            silent=quiet(),
-        )
+        return DefaultScreen(head, table, ranked, steps.split(STEP), lines, quiet())
     body = [*head]
     for part in (*([] if table is None else [table()]), *more):
         body += [Text(), part]
@@ -421,6 +419,8 @@ BREAK = re.compile("[,;:] ")  # where `Clauses` may be broken
 class DefaultScreen:
     """A head, a table, notes in the order of what they change, and steps to take next: as many rows
     and notes as the lines of a screen hold, which is measured when it is shown.
+
+    Where it has lines left, tables tell which columns they leave out.
     """
 
     def __init__(
@@ -430,61 +430,57 @@ class DefaultScreen:
         notes: Sequence[Note],
         steps: Sequence[str],
         lines: tuple[int, int],
-        *,
         silent: bool,
     ) -> None:
         self.head = [Clauses(part) if isinstance(part, Text) else part for part in head]
-        self.table, self.steps, self.silent = table, steps, silent
-        self.count, self.lines = len(notes), lines
-        self.notes = [screen_line(entry) for entry in notes if not is_detail(entry)]
-        self.warnings = min(sum(severity(entry) == WARNING for entry in notes), NOTES)
+        self.table, self.notes, self.lines, self.silent = table, notes, lines, silent
+        self.steps = [with_file(step) for step in steps]
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width = options.max_width
-        most = self.lines[width < WIDTH]
-        sizes = [size for size in SIZES if size[1] >= self.warnings]
-        for make in (lambda parts: parts, _dense):
-            for rows, count in sizes:
-                shown = Group(*make(self._cut(rows, count, width)))
-                if lines_of(shown, width=width) <= most:
-                    yield shown
-                    return
-        yield shown
+        limit = self.lines[width < WIDTH]
+        warned = min(sum(severity(entry) == WARNING for entry in self.notes), NOTES)
+        sizes = [size for size in SIZES if size[1] >= warned]
+        for blanks, (rows, count) in product((True, False), sizes):
+            every = self._parts(rows, count, width)
+            parts = [part for part in every if blanks or not isinstance(part, Text) or part.plain]
+            if lines_of(*parts, width=width) <= limit:
+                break
+        for part in parts:
+            if isinstance(part, FittedColumns) and part.left_out(width) and not self.silent:
+                part.told = True
+                part.told = lines_of(*parts, width=width) <= limit
+        yield Group(*parts)
 
-    def _cut(self, rows: int, count: int, width: int) -> list[RenderableType]:
+    def _parts(self, rows: int, count: int, width: int) -> list[RenderableType]:
         """Parts of the screen with so many rows before the last one, and so many notes."""
         parts: list[RenderableType] = [*self.head]
         if self.table is not None:
             parts += [Text(), self.table(first=rows)]
-        parts = [*_parts(Group(*parts))]
+        parts = [*_ungrouped(parts)]
         for part in parts:
             if isinstance(part, FittedColumns):
                 part.shortened = True
-        shown = self.notes if self.silent else self.notes[:count]
-        if shown and self.table is not None:
+        told = [screen_line(entry) for entry in self.notes if not is_detail(entry)]
+        if not self.silent:
+            told = told[:count]
+        if told and self.table is not None:
             parts.append(Text())
+        parts += told
         if self.silent:
-            return [*parts, *shown]
-        hidden = self.count - len(shown)
+            return parts
+        hidden = len(self.notes) - len(told)
         last = "-v all values" + (f" ({hidden} more)" if hidden else "")
         for step in self.steps:
             if len(last) + len(STEP) + len(step) <= width:
                 last += STEP + step
-        return [*parts, *shown, Text(last, style="dim")]
+        return [*parts, Text(last, style="dim")]
 
 
-def _parts(part: RenderableType) -> Iterator[RenderableType]:
-    """Parts of a group, and of groups in it."""
-    if isinstance(part, Group):
-        for each in part.renderables:
-            yield from _parts(each)
-    else:
-        yield part
-
-
-def _dense(parts: Iterable[RenderableType]) -> list[RenderableType]:
-    """Parts without blank lines between them."""
-    return [part for part in parts if not isinstance(part, Text) or part.plain]
+def _ungrouped(parts: Iterable[RenderableType]) -> Iterator[RenderableType]:
+    """Parts, and those of groups among them."""
+    for part in parts:
+        yield from _ungrouped(part.renderables) if isinstance(part, Group) else (part,)
 
 
 def title(spacecraft: Spacecraft) -> Text:

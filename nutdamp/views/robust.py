@@ -15,20 +15,16 @@ from rich.text import Text
 from nutdamp.common.results import Note, note
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import (
-    alternatives,
-    comparison_warnings,
-    plan_notes,
     reasons,
-    spacecraft_notes,
-    verdict_notes,
 )
 from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
 from nutdamp.planning.screening import FlownPlan
 from nutdamp.spacecraft import requirements
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
-from nutdamp.views.glance import end_facts, headline, scheme_table
-from nutdamp.views.parts import named, pulse_table
+from nutdamp.views.dispersion import in_words, stated_text
+from nutdamp.views.glance import end_facts, glance, headline, notes, scheme_table
+from nutdamp.views.parts import named, pulse_table, summary
 from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
     TEXT,
@@ -43,14 +39,11 @@ from nutdamp.views.tables import (
 from nutdamp.views.text import (
     joined,
     note_json,
-    ordered,
-    rank,
     screen_line,
     sentence,
     small_angle,
     text,
 )
-from nutdamp.views.tolerances import in_words, stated_text
 from nutdamp.views.verdict import cases_json, exact_percent, percent, share_text
 
 MOST_ROWS = 12  # largest number of candidates in the table
@@ -61,7 +54,6 @@ def comparison_screen(compared: Comparison) -> RenderableType:
     judged, chosen = compared.verdict, compared.recommended
     head: list[RenderableType] = [named(compared.spacecraft), headline(compared)]
     tables: list[RenderableType] = []
-    notes = [*spacecraft_notes(compared.spacecraft)]
     if chosen is not None:
         head.append(Text(sentence(verdicts.statement(judged)), verdicts.STYLES[judged.light]))
         head.append(Text(sentence(f"{chosen.scheme}: {joined(reasons(compared))}")))
@@ -69,8 +61,6 @@ def comparison_screen(compared: Comparison) -> RenderableType:
             spent = verdicts.spent(cheaper.schedule)
             head.append(Text(f"cheaper: {cheaper.scheme}, {spent}, {text(cheaper.why)}", "dim"))
         tables = [verdicts.bound_table(judged).screen("screen"), end_facts(chosen)]
-        notes = [*comparison_warnings(compared, tabulated=True), *notes]
-        notes += [*verdict_notes(judged, chosen), *alternatives(compared)]
     tables.append(derived_table(compared.spacecraft))
     tables.append(scheme_table(compared, chosen).transposed("full"))
     if chosen is not None and chosen.pulses.blocks:
@@ -81,26 +71,28 @@ def comparison_screen(compared: Comparison) -> RenderableType:
             totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
         on_times = ((f"on-time of {name}", f"{total:.4f} s") for name, total in totals.items())
         tables += [pulse_table(chosen._flight).screen("full"), facts(on_times)]
-    notes += [note for plan in compared.plans for note in plan_notes(plan)]
-    spaced = [part for table in tables for part in (Text(), table)]
-    lines = [*map(screen_line, sorted(ordered(notes), key=rank))]
-    return Group(*head, *spaced, *([Text()] if lines else []), *lines)
+    return summary(head, None, notes(compared, verbose=True), "", more=tables, verbose=True)
 
 
-def robust_screen(robust: RobustComparison) -> RenderableType:
-    """All tables of ``plan --robust``."""
+def robust_screen(robust: RobustComparison, *, verbose: bool = True) -> RenderableType:
+    """The screen of ``plan --robust``; ``verbose``: with all tables."""
+    if not verbose:
+        return glance(robust.joined, robust_notes(robust))
+    shown = comparison_screen(robust.joined)
+    if robust.chosen is None:
+        return shown
+    rows = list(robust.candidates[:MOST_ROWS])
+    rows += [entry for entry in (robust.chosen, robust.usual) if entry and entry not in rows]
+    below = f"Plans below these: {len(robust.candidates) - len(rows)}; * without --robust."
+    name = f"{robust.chosen.plan.scheme}, {robust.chosen.variant}"
     reason = joined(robust_reasons(robust))
-    parts: list[RenderableType] = [comparison_screen(robust.joined)]
-    if robust.chosen is not None:
-        named = f"{robust.chosen.plan.scheme}, {robust.chosen.variant}"
-        parts += [
-            Text(),
-            Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
-            *map(Text, _fresh(robust)),
-            *map(screen_line, robust_notes(robust)),
-            *(Text(), *_candidates(robust)),
-        ]
-    return Group(*parts)
+    return Group(
+        shown,
+        *(Text(), Text.assemble("Robust plan: ", (name, "bold"), f" – {reason}.")),
+        *map(Text, _fresh(robust)),
+        *map(screen_line, robust_notes(robust)),
+        *(Text(), _table(robust, rows).screen("full"), Text(below, style="dim")),
+    )
 
 
 def robust_notes(robust: RobustComparison) -> list[Note]:
@@ -222,15 +214,6 @@ def _table(robust: RobustComparison, candidates: list[FlownPlan]) -> DataTable:
         Column("final", "", "", lambda row: final_json(row.plan._flight), where="json"),
     ]
     return DataTable("Candidates", columns, candidates, robust, mark)
-
-
-def _candidates(robust: RobustComparison) -> list[RenderableType]:
-    named = list(robust.candidates[:MOST_ROWS])
-    named += [
-        entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named
-    ]
-    below = f"Plans below these: {len(robust.candidates) - len(named)}; * without --robust."
-    return [_table(robust, named).screen("full"), Text(below, style="dim")]
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:

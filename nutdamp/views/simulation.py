@@ -51,9 +51,7 @@ from nutdamp.views.text import (
     degrees,
     mass,
     moment,
-    ordered,
     quantity,
-    screen_line,
     small_angle,
 )
 
@@ -74,9 +72,7 @@ def _end_table(simulation: Simulation) -> DataTable:
         name = MODELS[flight.model]
         return f"{name}, track" if flight.model == simulation.shown.model else name
 
-    residuals = ["nutation", "body_cone", "space_cone", "momentum_shift"]
-    if spacecraft.goal.axis is not None:
-        residuals.append("axis_error")
+    residuals = parts.RESIDUALS[: None if spacecraft.goal.axis is not None else -1]
     columns = [
         Column("", "model", "", model, where="screen", kind=TEXT),
         *(
@@ -111,22 +107,21 @@ def simulation_screen(
     ]
     head += [verdicts.bound_table(judged).screen("screen")] if judged.lines else []
     ends = _end_table(simulation)
+    verify = "nutdamp verify"
+    if simulation.plan._from_file:
+        kind = "blocks" if simulation.plan.pulses.blocks else "schedule"
+        verify += f" --{kind} {shlex.quote(simulation.plan.scheme)}"
+    until = moment(extremes.until)
+    track = f"{extremes.rows} rows, 0 to {until}, by the {simulation.shown.model}"
+    watched = parts.aspect_facts(aspects(simulation.shown, extremes.until)) if verbose else ()
     return parts.summary(
         head,
-        lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
+        lambda **_: ends.transposed("screen", f"end of track, {until}"),
         [*_notes(simulation), *planned],
-        parts.STEP.join(["--csv track.csv", "--plot motion.png", _verified(simulation.plan)]),
-        more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
+        parts.STEP.join(["--csv track.csv", "--plot motion.png", verify]),
+        more=[*_fired(simulation), facts([*watched, ("track", track)])] if verbose else (),
         verbose=verbose,
     )
-
-
-def _verified(plan: Plan) -> str:
-    """The command that verifies the schedule of a file, or the recommended plan."""
-    if not plan._from_file:
-        return "nutdamp verify"
-    kind = "blocks" if plan.pulses.blocks else "schedule"
-    return f"nutdamp verify --{kind} {shlex.quote(plan.scheme)}"
 
 
 def _notes(simulation: Simulation) -> Iterator[Note]:
@@ -206,13 +201,6 @@ def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
     # a track may end before the last one
     rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
     return replace(table, rows=rows)
-
-
-def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
-    extremes = simulation.extremes
-    yield from parts.aspect_facts(aspects(simulation.shown, extremes.until))
-    model = simulation.shown.model
-    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}, by the {model}"
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
@@ -439,31 +427,27 @@ def verification_screen(
         for method in verification.methods
         if method.missing
     ]
-    methods = methods_table(verification).screen("screen")
-    if verbose:
-        return Group(
-            *head,
-            *(Text(), decisions.derived_table(spacecraft)),
-            *(Text(), methods),
-            *(Text(), Text(BUDGET, "bold"), Text()),
-            *(budget_table(spacecraft, verification).screen("screen"), Text(BUDGET_NOTE, "dim")),
-            Text(),
-            *map(screen_line, ordered((*missing, conservation(verification), *planned))),
-        )
-    notes = [conservation(verification)]
+    notes = [conservation(verification), *missing, *planned]
     # The imperfection that leaves the most nutation alone, where one leaves more than ideal
-    # impulses.
+    # impulses; the budget shows them all.
     single = [
         row
         for row in verification.budget
         if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name
     ]
     worst = max(single, key=lambda row: row.nutation, default=None)
-    if worst is not None and worst.nutation - verification.budget[0].nutation > SHOWN:
+    least = verification.budget[0].nutation
+    if not verbose and worst is not None and worst.nutation - least > SHOWN:
         angle = math.degrees(worst.nutation)
-        notes.append(note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
+        notes.insert(1, note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
+    budget = budget_table(spacecraft, verification).screen("screen")
     return parts.summary(
-        head, lambda **_: methods, [*notes, *missing, *planned], "--json verified.json"
+        [*head, *((Text(), decisions.derived_table(spacecraft)) if verbose else ())],
+        lambda **_: methods_table(verification).screen("screen"),
+        notes,
+        "--json verified.json",
+        more=[Group(Text(BUDGET, "bold"), Text(), budget, Text(BUDGET_NOTE, "dim"))],
+        verbose=verbose,
     )
 
 
@@ -558,4 +542,5 @@ def conservation(verification: Verification) -> Note:
 def _course(course: Conservation) -> str:
     how = f"changed by {' and '.join(course.changed)}" if course.changed else "constant to rounding"
     how = "NOT constant" if course.kept is False else how
-    return f"{how} (by {_difference(course.drift)} of itself at most)" if course.drift else how
+    drift = _difference(course.drift)
+    return how if drift == "0" else f"{how} (by {drift} of itself at most)"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
 from typing import Any, NamedTuple
@@ -83,100 +83,99 @@ class FittedColumns(Table):
     """A table with a line a row, however narrow the screen is.
 
     Where its columns do not fit side by side, those with a rank are left out if it may be
-    ``shortened``, the largest rank first. What still does not fit goes on below, beside the first
-    column again.
+    ``shortened``, the largest rank first; if it is ``told``, a last line names them. What still
+    does not fit goes on below, beside the first column again.
     """
 
     ranks: tuple[int, ...] = ()
     shortened = False
+    told = False
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        every, room = list(self.columns), options.max_width
-        texts = [
-            [str(column.header), *(_cell(cell).plain for cell in column.cells)] for column in every
-        ]
-        first, *others = range(len(every))
-        while self.shortened and not _fitted(
-            [texts[at] for at in (first, *others)], room, rows=True
-        ):
-            ranked = max(others, key=self.ranks.__getitem__, default=first)
+    def texts(self) -> list[list[str]]:
+        """Heading and cells of each column."""
+        return [[_plain_text(each.header), *map(_plain_text, each.cells)] for each in self.columns]
+
+    def left_out(self, room: int) -> list[int]:
+        """Places of the columns that ``room`` characters leave out."""
+        texts = self.texts()
+        shown = list(range(len(texts)))
+        while self.shortened and not fitted([texts[at] for at in shown], room, words=False):
+            ranked = max(shown, key=self.ranks.__getitem__)
             if not self.ranks[ranked]:
                 break
-            others.remove(ranked)
-        below = False
-        while others or not below:
-            count = len(others)
-            while count > 1 and not _fitted(
-                [texts[at] for at in (first, *others[:count])], room, rows=False
-            ):
+            shown.remove(ranked)
+        return [at for at in range(len(texts)) if at not in shown]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        every = list(self.columns)
+        texts = self.texts()
+        room = options.max_width
+        left_out = self.left_out(room)
+        shown = [at for at in range(len(every)) if at not in left_out]
+        while shown:
+            count = len(shown)
+            while count > 2 and not fitted([texts[at] for at in shown[:count]], room):
                 count -= 1
-            part = [first, *others[:count]]
-            others = others[count:]
-            widths, gap = _fitted([texts[at] for at in part], room, rows=False) or (
-                [None] * len(part),
-                1,
-            )
+            part, below = shown[:count], shown[count:]
+            widths, gap = fitted([texts[at] for at in part], room) or ([None] * count, 1)
             self.columns = [
                 replace(every[at], width=width, _index=place)  # by it rich finds the last one
-                for place, (at, width) in enumerate(zip(part, widths, strict=False))
+                for place, (at, width) in enumerate(zip(part, widths, strict=True))
             ]
             self.padding = (0, gap, 0, 0)
+            yield from super().__rich_console__(console, options)
             if below:
                 yield Text()
-            yield from super().__rich_console__(console, options)
-            below = True
+            shown = [0, *below] if below else []
         self.columns = every
+        if self.told and left_out:
+            names = (" ".join(texts[at][0].split()) for at in left_out)
+            words = f"left out: {', '.join(names)}"
+            cure = " (-v or a wider screen)"
+            yield Text(words + cure if len(words + cure) <= room else words, style="dim")
 
 
-def _cell(cell: RenderableType) -> Text:
-    return cell if isinstance(cell, Text) else Text(str(cell))
-
-
-def _fitted(
-    columns: list[list[str]], room: int, *, rows: bool
+def fitted(
+    columns: list[list[str]], room: int, *, words: bool = True
 ) -> tuple[Sequence[int | None], int] | None:
-    """Characters for each column, and between two; None without ``room``.
+    """Characters for each column, whose first text is its heading, and between two; None without
+    ``room``.
 
-    The gap narrows before headings take two lines; then words are what stays whole, unless all
-    ``rows`` do.
+    The gap narrows before headings take two lines; then with ``words`` these are what stays whole,
+    else all rows do. Room to spare goes to the names of rows, then to what stands last, such as
+    reasons.
     """
     whole = [_longest(texts) for texts in columns]
-    lines = [max(_longest(texts[1:]), _on_two_lines(texts[0])) for texts in columns]
-    words = [_longest_word(texts) for texts in columns]
-    for least in (whole, lines) if rows else (whole, lines, words):
+    lines = [
+        max(min(map(_longest, _halves(heading))), _longest(cells)) for heading, *cells in columns
+    ]
+    parts = [_longest(word for text in texts for word in WORD.findall(text)) for texts in columns]
+    for least in (whole, lines, *([parts] if words else [])):
         for gap in GAPS:
             spare = room - sum(least) - gap * (len(columns) - 1)
-            if spare >= 0:
-                return _widened(least, (lines, whole), spare), gap
+            if spare < 0:
+                continue
+            widths = list(least)
+            for wider in (lines, whole):
+                for at in (0, *range(len(widths) - 1, 0, -1)):
+                    more = max(min(wider[at] - widths[at], spare), 0)
+                    widths[at] += more
+                    spare -= more
+            return widths, gap
     return None
 
 
-def _widened(least: list[int], wanted: Iterable[list[int]], spare: int) -> list[int]:
-    """Widths with the ``spare`` characters shared out: names of rows first, then what stands last,
-    such as reasons.
-    """
-    widths = list(least)
-    for wider in wanted:
-        for at in (0, *range(len(widths) - 1, 0, -1)):
-            more = max(min(wider[at] - widths[at], spare), 0)
-            widths[at] += more
-            spare -= more
-    return widths
+def _plain_text(cell: RenderableType) -> str:
+    return cell.plain if isinstance(cell, Text) else str(cell)
 
 
-def _on_two_lines(heading: str) -> int:
-    """Characters that a heading takes on two lines."""
+def _halves(heading: str) -> Iterator[tuple[str, str]]:
+    """A heading on one line, and on two broken at each of its blanks."""
     words = heading.split(" ")
-    halves = ((" ".join(words[:at]), " ".join(words[at:])) for at in range(1, len(words) + 1))
-    return min(map(_longest, map(list, halves)))
+    return ((" ".join(words[:at]), " ".join(words[at:])) for at in range(1, len(words) + 1))
 
 
-def _longest_word(texts: list[str]) -> int:
-    """Characters of the longest word."""
-    return max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0)
-
-
-def _longest(texts: list[str]) -> int:
+def _longest(texts: Iterable[str]) -> int:
     """Characters of the longest line."""
     return max((cell_len(line) for text in texts for line in text.split("\n")), default=0)
 

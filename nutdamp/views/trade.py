@@ -99,8 +99,13 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
     def met(row: TradeRow) -> bool | None:
         return row.point.verdict.met
 
+    def saved(row: TradeRow) -> str:
+        first = next(other for other in rows if other.front is row.front)
+        return fixed(100.0 * (row.point.cost / first.point.cost - 1.0), 1)
+
     columns = [
-        Column.named("point=number", "point", "", where=everywhere, kind=WHOLE),
+        Column.named("point=number", "point", "", where=f"{everywhere} json-head", kind=WHOLE),
+        *file_columns("json-head", "horizon_s=point.horizon"),
         Column.named(
             "shift_allowed_deg=front.shift", "H within", "deg", within, "csv brief", rank=2
         ),
@@ -131,8 +136,8 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             rank=1,
         ),
         *file_columns("csv", "axis_error_deg=residual.axis_error"),
-        Column("", f"vs point {first}", "%", _saved, where="full"),
-        Column("", "vs first", "%", _saved, where="" if others else "brief", rank=3),
+        Column("", f"vs point {first}", "%", saved, where="full"),
+        Column("", "vs first", "%", saved, where="" if others else "brief", rank=3),
         Column.named(
             "scheme=point.plan.scheme",
             Shared.SCHEME,
@@ -140,9 +145,9 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             where=everywhere if others else "csv",
             kind=TEXT,
         ),
-        Column.named("status=point.verdict.status.value", "", "", where="csv", kind=TEXT),
-        *file_columns("csv", "share=point.verdict.cases.complying"),
-        Column("meets_requirement", "", "", met, where="csv", kind=YES_NO),
+        Column.named("status=point.verdict.status.value", "", "", where="csv json", kind=TEXT),
+        *file_columns("csv json", "share=point.verdict.cases.complying"),
+        Column("meets_requirement", "", "", met, where="csv json", kind=YES_NO),
         Column(
             "", "comply", "", attrgetter("point.verdict.cases"), share_text, shown if flown else ""
         ),
@@ -158,11 +163,6 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
         ),
     ]
     return DataTable("Schedules by their ends", columns, rows)
-
-
-def _saved(row: TradeRow) -> str:
-    """Extra cost over the point that ends first on the front, %."""
-    return fixed(100.0 * (row.point.cost / row.front.points[0].cost - 1.0), 1)
 
 
 def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
@@ -188,13 +188,12 @@ def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
         words = coloured(f"{len(good)} of {len(points)} schedules may be flown", light)
         head.append(Text.assemble(("Requirement ", "bold"), f"({required}) ", words))
     if verbose:
-        derived = derived_table(spacecraft)
-        return Group(*head, Text(), derived, *front_parts(spacecraft, fronts))
+        more = [derived_table(spacecraft), *front_parts(spacecraft, fronts)]
+        return summary(head, None, (), "", more=more, verbose=True)
     notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
-    shown = {round(at) for at in np.linspace(0, len(points) - 1, ROWS).tolist()} if points else ()
-    rows = [points[index] for index in sorted(shown)]
+    rows = _shown_once(points)
     if len(rows) < len(points):
         notes.append(note("trade-points", shown=len(rows), count=len(points)))
     return summary(
@@ -205,28 +204,35 @@ def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
     )
 
 
+def _shown_once(points: Sequence[TradeRow]) -> list[TradeRow]:
+    """The points of a screen: of those with the same printed values the first, and evenly some of
+    more than `ROWS`.
+    """
+    printed = [cells[1:] for cells in _table(points).cells("brief")]  # without the number
+    rows = [row for at, row in enumerate(points) if printed[at] not in printed[:at]]
+    evenly = np.linspace(0, len(rows) - 1, min(ROWS, len(rows)))
+    return [rows[round(at)] for at in evenly.tolist()]
+
+
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
-    """The table of each front under its name."""
+    """The table of each front under its name, and notes on all."""
     parts: list[RenderableType] = []
     for front in fronts:
-        parts += [
-            Text(),
-            Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold"),
-        ]
+        name = front_name(front, pointing=spacecraft.goal.axis is not None)
+        lines: list[RenderableType] = [Text(name, style="bold")]
         if front.why is not None:
-            parts.append(Text(_without_optimal(front)))
+            lines.append(Text(_without_optimal(front)))
         if front.points:
-            parts.append(
-                _table([row for row in rows_of(fronts) if row.front is front]).screen("full")
-            )
+            rows = [row for row in rows_of(fronts) if row.front is front]
+            lines.append(_table(rows).screen("full"))
+        parts.append(Group(*lines))
     priced = [(row.spent(row.point.cost), row.spent(row.bound)) for row in rows_of(fronts)
               if row.bound is not None and row.point.cost < row.bound]  # fmt: skip
     # As the table writes both.
     differ = any(spent != bound for spent, bound in priced)
     below = [note("trade-below-bound")] if differ else []
-    for sentence in sentences((*below, *_ends_off(fronts))):
-        parts += [Text(), Text(sentence, style="dim")]
-    return parts
+    told = sentences((*below, *_ends_off(fronts)))
+    return [*parts, *(Text(sentence, style="dim") for sentence in told)]
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:
@@ -287,17 +293,17 @@ def trade_json(traded: Trade) -> dict[str, Any]:
     """All fronts with their plans, in the form of ``plan --json``."""
     entries = []
     for front in traded.fronts:
-        rows = [row for row in rows_of(traded.fronts) if row.front is front]
+        table = _table([row for row in rows_of(traded.fronts) if row.front is front])
         points = [
             {
-                **values_of(row, "point=number", "horizon_s=point.horizon"),
+                **head,
                 **plan_json(row.point.plan),
-                "status": row.point.verdict.status.value,
-                "meets_requirement": row.point.verdict.met,
-                **values_of(row, "share=point.verdict.cases.complying"),
+                **judged,
                 "decision": verdict_json(row.point.verdict),
             }
-            for row in rows
+            for row, head, judged in zip(
+                table.rows, table.json("json-head"), table.json(), strict=True
+            )
         ]
         entries.append({**values_of(front, "shift_allowed_deg=shift", "why"), "points": points})
     return {**heading(traded.spacecraft), "fronts": entries}
@@ -317,51 +323,40 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 # --- beside a recommended plan
 
 
-def _better(
-    fronts: Sequence[Front], chosen: Plan, *, misses: bool
-) -> tuple[float, float, TradeRow] | None:
-    """Share of the cost saved, s earlier, and the cheapest, then earliest, point that is better
-    than ``chosen``.
+def trade_notes(
+    fronts: Sequence[Front], chosen: Plan, judged: Verdict, craft: str = "SPACECRAFT"
+) -> Iterator[Note]:
+    """The schedule of a front that is better than the ``chosen`` plan, with its command for the
+    words ``craft`` of a spacecraft; or that costs more.
     """
-    until = chosen.pulses.end
+    misses = judged.met is False
+    error = chosen._flight.residual.axis_error
     better = []
     for row in rows_of(fronts):
         saved = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit)
-        end = row.pulses.end
-        cheaper = saved > SAME_COST and end <= until
+        earlier = chosen.pulses.end - row.pulses.end
+        cheaper = saved > SAME_COST and earlier >= 0.0
+        near = row.residual.axis_error <= FARTHER * error + SAME_ANGLE
+        sooner = abs(saved) <= SAME_COST and earlier > SOONER * chosen.pulses.end and near
         able = row.point.verdict.met and not fails(row.point)
-        if able and (misses or cheaper or _sooner(row.point.plan, chosen, saved)):
-            better.append((saved if misses or saved > SAME_COST else 0.0, until - end, row))
-    return max(better, key=itemgetter(0, 1), default=None)
-
-
-def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
-    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H
-    about as near.
-    """
-    shifts = [flown._flight.residual.axis_error for flown in (plan, chosen)]
-    ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
-    return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
-
-
-def trade_notes(fronts: Sequence[Front], chosen: Plan, judged: Verdict) -> Iterator[Note]:
-    """The schedule of a front that is better than the ``chosen`` plan, with its command; or that
-    costs more.
-    """
-    better = _better(fronts, chosen, misses=judged.met is False)
-    if better is not None:
-        row = better[2]
-        shift = better[2].front.shift
+        if able and (misses or cheaper or sooner):
+            better.append((saved if misses or cheaper else 0.0, earlier, row))
+    if better:
+        _, _, row = max(better, key=itemgetter(0, 1))
+        shift = row.front.shift
         aim = "--free-axis " if math.isinf(shift) else ""
         if 0.0 < shift < math.inf:
             aim = f'--shift "{degrees(shift)}" '
         horizon = f'--set "limits.horizon={row.point.horizon:.6g} s"'
-        command = f"nutdamp plan SPACECRAFT --scheme {row.point.plan.scheme} {aim}{horizon}"
+        plan = " ".join(filter(None, ("nutdamp plan", craft)))
+        command = f"{plan} --scheme {row.point.plan.scheme} {aim}{horizon}"
         shown = notes.figures(row.point.plan, chosen, row.point.unit == "kg")
-        if judged.met is False:
-            yield note("trade-meets", point=row.number, command=command, **shown)
-        else:
-            yield note("trade-better", point=row.number, command=command, **shown)
+        yield note(
+            "trade-meets" if misses else "trade-better",
+            point=row.number,
+            command=command,
+            **shown,
+        )
     rows = [
         row
         for row in rows_of(fronts)

@@ -275,7 +275,9 @@ def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None
     assert codes((failing,), plan) == []
     pairs = ((cheaper, chosen), (alike, later), ((whole,), plan))
     assert [codes(*pair) for pair in pairs] == [["trade-better"], ["trade-better"], ["trade-meets"]]
-    assert next(trade_notes(cheaper, chosen, chosen.verdict)).values["point"] == 3
+    better = next(trade_notes(cheaper, chosen, chosen.verdict, "own.yaml"))
+    assert better.values["point"] == 3
+    assert str(better.values["command"]).startswith("nutdamp plan own.yaml --scheme ")
     check_text(
         "pictures.trade-better",
         "\n".join(text(note) for pair in pairs for note in trade_notes(*pair, pair[1].verdict)),

@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 from collections.abc import Iterable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,10 @@ from support.cases import deep, weekly
 from support.commands import CRAFTS, DATED, SCHEDULE, contents, written
 from support.golden import check_text
 from support.loops import follow_few_cycles
-from support.process import Run
+from support.process import Run, unpictured
+from support.shown import parsed
+
+from nutdamp.schemes.catalogue import NAMES
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -33,10 +37,22 @@ def spinning(value: float) -> str:
     return table(f"t_s,omega_1_{unit},omega_3_{unit}", sway)
 
 
+MARKUP = """
+name: "[red]Evil[/] [/] :rocket:"
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg}
+thrusters:
+  - {name: "[red]", torque: [8, 0, 0]}
+  - {name: "[/]", torque: [0, 8, 0]}
+  - {name: ":rocket:", torque: [-8, 0, 0]}
+dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
+"""
+"""Names that look like markup or emoji are shown as they are."""
 TABLE = (Path(__file__).parent / "commands.txt").read_text(encoding="utf-8").split("\n=== ")[1:]
 SAID = (
     r"ENOUGH|PLAN|warning|equirement|≤|infeasible|cannot|does not|needs|least impulse|there is no"
 )
+TWICE = re.compile(rf"\b({'|'.join(NAMES)}):? ?\1: ")  # a scheme that is named twice
 MARKS = {"deep": deep, "weekly": weekly}
 RATES = "t_s,omega_1_rad_s,omega_3_rad_s"
 UNITS = {"180": 180.0, "30": 30.0, "314": math.pi, "-30": -30.0, "017": math.pi**2 / 180.0}
@@ -50,6 +66,7 @@ FILES = {
     "own_csv": SCHEDULE.replace(",channel", "").replace("1,0,steerable,4", "1,0,-5")
     + "2,0.5,0,4,0\n",
     "old_csv": "old",
+    "markup_yaml": MARKUP,
 }
 
 
@@ -80,12 +97,19 @@ def plain(value: Any) -> Any:
     return [plain(entry) for entry in value] if isinstance(value, list) else value
 
 
+def said_on(page: str) -> str:
+    """The text of a page of ``report``, behind the kind of its verdict."""
+    tree = parsed(page)
+    (decision,) = (node for node in tree.all("section") if node.attributes["id"] == "decision")
+    return f"{decision.attributes['class']}: {tree.text}".replace("\N{NO-BREAK SPACE}", " ")
+
+
 @pytest.mark.parametrize(("name", "rows"), [group(text) for text in TABLE])
 def test_commands(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, rows: list[str]
 ) -> None:
-    """Lines of the screen that a pattern picks, or values of the JSON; files written or changed;
-    all of standard error.
+    """Lines of the screen that a pattern picks, what one picks of the page, or values of the JSON;
+    files written or changed; all of standard error.
     """
     follow_few_cycles(monkeypatch)
     written(tmp_path, **CRAFTS, **FILES)
@@ -96,11 +120,19 @@ def test_commands(
         before = contents(tmp_path)
         line = command.replace("CONFIGS", str(places.CONFIGS)).replace("CASES", str(places.CASES))
         columns = 200 if kept else 80  # where lines are picked, sentences are in one
-        ended = run(*shlex.split(line), *(["--json", "-"] if paths else []), columns=columns)
+        page = kept[0].removeprefix("page ") if kept and kept[0].startswith("page ") else None
+        with nullcontext() if page is None else unpictured():
+            ended = run(*shlex.split(line), *(["--json", "-"] if paths else []), columns=columns)
         assert "Traceback" not in ended.stderr
         assert (ended.returncode, row) == (int(status), row), ended.stderr
+        assert not re.search(" $", ended.stdout, re.MULTILINE), row  # no blanks fill up lines
+        assert not TWICE.search(f"{ended.stdout}\n{ended.stderr}"), row
         assert paths or not re.search(r"…(?! +\d+ more)", ended.stdout), row  # no value is cut
-        if paths:
+        if page is not None:
+            told = said_on((tmp_path / "report.html").read_text(encoding="utf-8"))
+            assert not TWICE.search(told), row
+            texts = [*dict.fromkeys(re.findall(page, told))]
+        elif paths:
             data = json.loads(ended.stdout)
             texts = [f"{path} {json.dumps(plain(at(data, path[1:])))}" for path in paths]
         else:

@@ -17,7 +17,6 @@ from support.commands import (
     EXACT,
     GOOD,
     call,
-    names,
     python,
     refusals,
     result,
@@ -25,7 +24,6 @@ from support.commands import (
     written,
 )
 from support.contract import BROKEN
-from support.golden import check_text
 from support.process import Run
 
 from nutdamp import __version__, errors
@@ -42,41 +40,13 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 # --------------------------------------------------------------------------------------------------
 
 
-def test_each_of_several_files_is_shown_as_alone_with_a_blank_line_below(
-    run: Run, tmp_path: Path
-) -> None:
-    written(tmp_path, good_yaml=GOOD, plain_yaml=EXACT)
-    alone = [run("check", name).stdout for name in ("good.yaml", "plain.yaml")]
-    assert run("check", "good.yaml", "plain.yaml").stdout == "".join(f"{text}\n" for text in alone)
-
-
 # --- init, schema, version
 # --------------------------------------------------------------------------------------------
 
 
-def test_init_writes_a_file_that_plans_and_takes_the_place_of_none_unless_forced(
-    run: Run, tmp_path: Path
-) -> None:
-    assert run("init").returncode == 0
-    assert run("plan", "--scheme", "two-pulse").returncode == 0
-    assert "--force" in refusals(run, tmp_path, ["init"], 1)
-    written(tmp_path, spacecraft_yaml="mine")
-    assert run("init", "--force").returncode == run("init", "other.yaml").returncode == 0
-    example = (tmp_path / "spacecraft.yaml").read_text()
-    assert run("init", "-").stdout == (tmp_path / "other.yaml").read_text() == example
-    assert run("plan", "other.yaml", "--scheme", "two-pulse").returncode == 0
-
-
-def test_init_lists_and_writes_the_spacecraft_that_ship_with_nutdamp(
-    run: Run, tmp_path: Path
-) -> None:
-    listed = run("init", "--list").stdout
-    configs = [path.stem for path in places.CONFIGS.glob("*.yaml")]
-    assert configs
-    assert [name for name in configs if name not in listed] == names(tmp_path) == []
-    assert run("init", "--from", "ace", "mine.yaml").returncode == 0
+def test_init_writes_a_file_that_ships_as_it_is(run: Run, tmp_path: Path) -> None:
+    run("init", "--from", "ace", "mine.yaml", status=0)
     assert (tmp_path / "mine.yaml").read_bytes() == (places.CONFIGS / "ace.yaml").read_bytes()
-    assert "ACE" in run("check", "mine.yaml").stdout
 
 
 def test_schema_is_json_and_the_version_is_that_of_the_package(run: Run, tmp_path: Path) -> None:
@@ -190,37 +160,6 @@ def test_the_first_help_page_has_few_options_and_help_all_every_one(run: Run, co
     assert not whole or {*first} < {*whole}
 
 
-def offered(words: str) -> list[str]:
-    """What a shell is offered for the last of the ``words`` of a command line."""
-    shell = ShellComplete(group, {}, "nutdamp", "_NUTDAMP_COMPLETE")
-    *before, begun = words.split(" ")
-    return [item.value for item in shell.get_completions(before, begun)]
-
-
-def test_topics_keys_and_schemes_are_completed() -> None:
-    assert offered("explain momentum-sh") == ["momentum-shift", "momentum-shift-of-target"]
-    assert offered("plan --set limits.h") == ["limits.horizon="]
-    assert offered("plan --set thrusters.") == []  # each file names its own
-    assert offered("plan --scheme rh") == ["rhumb-line"]
-
-
-def test_a_channel_of_a_file_is_explained_as_plan_says(run: Run) -> None:
-    file = f"{places.CONFIGS}/cluster.yaml"
-    shown = run("plan", file, "--scheme", "two-pulse", columns=200, status=0).stdout
-    _, command, *_ = shown.splitlines()[-1].split(" · ")
-    first, *words = command.split()
-    assert (first, words[0], words[-1]) == ("nutdamp", "explain", file)
-    for name in ("+M2", "-M2"):
-        check_text(f"explain.{name}", run("explain", name, file, status=0).stdout)
-    run("explain", "+M9", file, status=2)
-
-
-def test_trade_shows_no_option_that_it_does_not_read(run: Run) -> None:
-    """No scheme of a front reads the Sun, and none is left out of it for a bug."""
-    shown = run("trade", "--help").stdout
-    assert [option in shown for option in ("--target", "--sun ", "--debug")] == [True, False, False]
-
-
 COMPLETED = {
     **{
         f"{words} {name}": f"file {name}"
@@ -241,6 +180,10 @@ COMPLETED = {
     "ver": "plain verify",
     "plan --targ": "plain --target",
     "plan --scheme two": "plain two-pulse",
+    "plan --scheme rh": "plain rhumb-line",
+    "explain momentum-sh": "plain momentum-shift, plain momentum-shift-of-target",
+    "plan --set limits.h": "plain limits.horizon=",
+    "plan --set thrusters.": "",  # each file names its own
 }
 
 
@@ -248,9 +191,8 @@ def test_shells_complete_commands_options_choices_and_leave_files_to_the_shell()
     shell = ShellComplete(group, {}, "nutdamp", "_NUTDAMP_COMPLETE")
     for words, expected in COMPLETED.items():
         *before, last = words.split()
-        assert [f"{item.type} {item.value}" for item in shell.get_completions(before, last)] == [
-            expected
-        ], words
+        offered = (f"{item.type} {item.value}" for item in shell.get_completions(before, last))
+        assert ", ".join(offered) == expected, words
 
 
 @pytest.mark.deep
@@ -373,46 +315,3 @@ def test_a_written_schedule_flies_as_it_was_planned(run: Run) -> None:
             assert flight[kind] == pytest.approx(planned[kind], abs=1e-11)
     pulses = run("plan", "--scheme", "two-pulse", "--csv", "-", "-q").stdout
     assert result(run, "simulate --schedule -", stdin=pulses)["flown"] == flight["flown"]
-
-
-@pytest.mark.parametrize(
-    ("keys", "scheme", "status", "grows"),
-    [
-        ("upper-stage.yaml --set limits.tick=20ms", "one-pulse", 0, True),
-        ("communications-spinner.yaml --set limits.max_pulses=3", "four-pulse", 4, False),
-    ],
-)
-def test_a_written_schedule_is_judged_as_the_plan_wherever_the_simulation_ends(
-    run: Run, keys: str, scheme: str, status: int, grows: bool
-) -> None:
-    """The motion after the last pulse changes; what is said of its end is marked as that."""
-    file = f"{places.CONFIGS}/{keys}"
-    planned = result(run, f"plan {file} --nominal --scheme {scheme} --csv own.csv", status=status)
-    for until in ("", "--until 300s"):
-        flight = result(run, f"simulate {file} --schedule own.csv {until}", status=status)
-        assert flight["judged_s"] == pytest.approx(planned["plans"][0]["end_s"], abs=1e-9)
-        ways = zip(
-            planned["decision"]["requirement"], flight["decision"]["requirement"], strict=True
-        )
-        for before, after in ways:
-            assert after["nominal_deg"] == pytest.approx(before["nominal_deg"], abs=1e-9)
-            assert after["part"] == before["part"]
-    screen = run("simulate", *file.split(), "--schedule", "own.csv", "--until", "300s").stdout
-    assert ("note[judged-at-end]" in screen) is grows
-
-
-def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run) -> None:
-    ended = run("simulate", status=0)
-    assert "SIMULATED two-pulse" in ended.stdout
-    assert ended.stdout == run("simulate", "--scheme", "two-pulse").stdout
-
-
-def test_free_motion_keeps_its_nutation_and_the_end_can_be_chosen(run: Run) -> None:
-    free = result(run, "simulate --scheme none", status=4)
-    assert free["pulses"] == []
-    assert free["flown"]["nutation_deg"] == pytest.approx(
-        free["spacecraft"]["nutation_deg"], rel=1e-12
-    )
-    early = result(run, "simulate --scheme two-pulse --until '3 s'")
-    assert early["until_s"] == 3.0
-    assert early["flown"]["nutation_deg"] > 1.0  # the second pulse is still to come

@@ -17,8 +17,6 @@ from support.commands import (
     contents,
     names,
     python,
-    words,
-    written,
 )
 from support.golden import check_text
 from support.process import Run
@@ -221,12 +219,6 @@ def test_what_is_not_installed_is_exit_1_with_the_cure_before_the_work(
 # --------------------------------------------------------------------------------------------------
 
 
-def page_of(folder: Path) -> str:
-    return parsed((folder / "report.html").read_text(encoding="utf-8")).text.replace(
-        "\N{NO-BREAK SPACE}", " "
-    )
-
-
 def verdict_of(folder: Path, kind: str) -> str:
     """The decision on the page, which is of that kind: met, caution or missed."""
     tree = parsed((folder / "report.html").read_text(encoding="utf-8"))
@@ -314,68 +306,6 @@ def test_standard_output_holds_the_page_alone(run: Run, tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-@pytest.mark.usefixtures("plain_pages")
-@pytest.mark.parametrize(
-    ("more", "options", "status", "said"),
-    [
-        deep("", "--scheme four-pulse", 3, "NO PLAN: no scheme is feasible"),
-        (
-            "requirement: {momentum_shift: 0.01 deg}\n",
-            "--scheme one-pulse",
-            4,
-            "NOT met with nominal values",
-        ),
-    ],
-    ids=["infeasible", "missed"],
-)
-def test_the_page_is_written_whatever_the_verdict(
-    run: Run, tmp_path: Path, more: str, options: str, status: int, said: str
-) -> None:
-    written(tmp_path, craft_yaml=EXACT + more)
-    ended = run("report", "craft.yaml", *options.split(), status=status)
-    assert said.rstrip(".").lower() in ended.stderr.lower()
-    assert said in verdict_of(tmp_path, "missed")
-
-
-@pytest.mark.deep
-@pytest.mark.usefixtures("plain_pages")
-def test_dispersions_decide_too(run: Run, tmp_path: Path) -> None:
-    text = EXACT + "requirement: {nutation: 0.2 deg}\ndispersions: {omega0: {normal: 1 deg/s}}\n"
-    written(tmp_path, craft_yaml=text)
-    assert run("report", "craft.yaml", "--scheme", "two-pulse", "--disperse", "1e3").returncode == 4
-    (share,) = re.findall(r"[\d.]+ % of cases comply", verdict_of(tmp_path, "missed"))
-    assert set(re.findall(r"[\d.]+ % of cases comply", page_of(tmp_path))) == {share}
-
-
-@pytest.mark.deep
-@pytest.mark.usefixtures("plain_pages")
-def test_a_page_of_a_schedule_judges_that_flight_alone(run: Run, tmp_path: Path) -> None:
-    assert run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "p.csv", "-q").returncode == 0
-    assert run("report", "--schedule", "p.csv").returncode == 0
-    assert "99.995 % of cases comply (99.7 % required)" in verdict_of(tmp_path, "met")
-    broken = ("--nominal", "--schedule", "p.csv", "--set", "limits.horizon=2 s")
-    assert run("report", *broken).returncode == 4  # the requirement is met, but a limit is not
-    assert "ends after the horizon of 2 s" in verdict_of(tmp_path, "missed")
-
-
-@pytest.mark.deep
-@pytest.mark.usefixtures("plain_pages")
-def test_a_page_of_command_blocks_knows_that_they_can_be_commanded(
-    run: Run, tmp_path: Path
-) -> None:
-    craft = str(places.case("cb1015.yaml"))
-    assert (
-        run(
-            "plan", craft, "--scheme", "command-block", "--blocks", "b.csv", "--csv", "p.csv"
-        ).returncode
-        == 0
-    )
-    assert run("report", craft, "--blocks", "b.csv").returncode == 0
-    assert "FLY" in verdict_of(tmp_path, "caution")
-    assert run("report", craft, "--schedule", "p.csv").returncode == 4
-    assert "CANNOT BE COMMANDED" in verdict_of(tmp_path, "missed")
-
-
 @pytest.mark.weekly
 @pytest.mark.usefixtures("plain_pages")
 def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(
@@ -388,56 +318,6 @@ def test_a_page_with_the_robust_plan_recommends_what_plan_robust_does(
         f"{100.0 * data['robust']['recommended']['met_fraction']:.2f} % of cases comply"
         in verdict_of(tmp_path, "met")
     )
-
-
-@pytest.mark.usefixtures("plain_pages")
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ("--disperse 300 spacecraft.yaml", "cases: 300, seed 1"),
-        weekly("spacecraft.yaml --disperse 300", "cases: 300, seed 1"),
-        weekly("--disperse=3e2 spacecraft.yaml", "cases: 300, seed 1"),
-        deep("--disperse", "cases: 20,000, seed 1"),
-        weekly("--disperse -o report.html", "cases: 20,000, seed 1"),
-        weekly("--trade 2", "small-angle bound"),
-        weekly("spacecraft.yaml --trade", "small-angle bound"),
-    ],
-)
-def test_numbers_of_cases_and_of_points_may_be_left_out(
-    run: Run, tmp_path: Path, options: str, text: str
-) -> None:
-    run("init")
-    assert run("report", "--scheme", "two-pulse", *options.split()).returncode in (0, 4)
-    assert text in page_of(tmp_path)
-    assert ("Time against cost" in page_of(tmp_path)) == ("--trade" in options)
-
-
-@pytest.mark.deep
-@pytest.mark.usefixtures("plain_pages")
-def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
-    assert (
-        run("report", "--nominal", "--scheme", "half-cone", "--target", "10deg,45deg").returncode
-        == 0
-    )
-    for text in (
-        "H ends attilt 10.0000 deg, azimuth 45.0000 deg",
-        "≤ 0.2 deg",
-        "deg off target",
-        "turn by 10°",
-    ):
-        assert text in page_of(tmp_path)
-
-
-@pytest.mark.weekly
-def test_a_page_shows_what_was_set(run: Run) -> None:
-    page = run(
-        "report", "-o", "-", "-q", "--scheme", "two-pulse", "--set", "state.nutation=8 deg"
-    ).stdout
-    said = words(parsed(page).text)
-    assert "damp 8°" in said
-    assert "Set in place of what the file says" in said
-    assert "--set 'state.nutation=8 deg'" in said
-    assert page.count("state.nutation") >= 2
 
 
 @pytest.mark.weekly

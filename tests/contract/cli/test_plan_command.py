@@ -16,7 +16,6 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.common import work
-from nutdamp.files.reader import example_text
 from nutdamp.files.schedules import PULSES_HEADER
 from nutdamp.schemes import two_pulse
 from nutdamp.spacecraft.schedule import Schedule
@@ -123,28 +122,6 @@ def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None
 
 # --- targets, the Sun, the spin
 # ---------------------------------------------------------------------------------------
-
-
-def test_cones_pulses_per_turn_and_the_sun_are_heeded(run: Run, tmp_path: Path) -> None:
-    written(
-        tmp_path, body_yaml="name: b\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 0}\n"
-    )
-    aimed = "plan body.yaml --target 30deg,0deg --scheme"
-    cones, straight, turns, by_sun = (
-        result(run, f"{aimed} {options}")["plans"][0]
-        for options in (
-            "half-cone --cones=3",
-            "rhumb-line",
-            "rhumb-line --per-turn=2",
-            "rhumb-line --sun 40deg,60deg",
-        )
-    )
-    assert cones["flown"]["axis_error_deg"] < 1e-7
-    assert len(cones["pulses"]) == 4
-    assert turns["flown"]["axis_error_deg"] < 1e-7
-    first, second = (pulse["t_s"] for pulse in turns["pulses"][:2])
-    assert second - first == pytest.approx(math.pi / 3.0, rel=1e-3)
-    assert by_sun["total_impulse_Nms"] > 1.01 * straight["total_impulse_Nms"]
 
 
 # --- a scheme that has a bug
@@ -300,9 +277,6 @@ def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(
 # --- what is recommended: dispersed cases, command blocks, needless pulses, spin changes, free H
 
 
-QUICK = ("--scheme", "two-pulse", "--scheme", "four-pulse")
-
-
 def planned(run: Run, *arguments: str, status: int = 0) -> dict[str, Any]:
     """The JSON of ``plan``."""
     found: dict[str, Any] = json.loads(run("plan", "--json", "-", *arguments, status=status).stdout)
@@ -310,23 +284,10 @@ def planned(run: Run, *arguments: str, status: int = 0) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.deep
-def test_a_robust_plan_is_compared_by_the_same_cases(run: Run) -> None:
-    share = planned(run, "--scheme", "two-pulse")["decision"]["cases"]["met_fraction"]
-    robust = planned(run, "--scheme", "two-pulse", "--robust")["robust"]
-    assert robust["against"]["met_fraction"] == pytest.approx(share)
-
-
 def test_an_undecided_share_does_not_meet(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work, "CASES", 1.0)
     found = planned(run, "--scheme", "two-pulse", status=4)
     assert (found["decision"]["status"], found["decision"]["met"]) == ("not-shown", False)
-
-
-def test_no_requirement_no_cases(run: Run) -> None:
-    text = example_text().replace("\nrequirement:", "\n# requirement:")
-    ended = run("plan", "-", *QUICK, "--json", "-", stdin=text)
-    assert json.loads(ended.stdout)["decision"]["cases"] is None
 
 
 def test_no_plan_can_be_commanded() -> None:

@@ -13,7 +13,6 @@ import math
 import os
 import re
 import shlex
-import statistics
 import subprocess
 import sys
 import tomllib
@@ -147,37 +146,8 @@ def test_pages_that_are_made_are_those_of_today() -> None:
         assert TEXTS[guide.FOLDER / f"{name}.md"] == text
 
 
-FIRST_READ = ("README", "tutorial", "reading", "robust", "fit", "blocks")
-"""Pages that no sentence of which should need a second reading."""
-READ = ("loop", "trade", "budget", "pointing", "report", "commands", "library", "campaign",
-        "limits", "speed", "units", "valves", "motion", "schemes", "contributing",
-        "changes")  # fmt: skip
-NO_SENTENCES = re.compile(
-    r"```.*?```|<!--.*?-->|!\[.*?\]\(.*?\)|^(?:#|\||    )[^\n]*",
-    re.DOTALL | re.MULTILINE,
-)
-"""Code blocks, comments, pictures; headings, rows of tables, formulas."""
-
-
-def lengths_of_sentences(text: str) -> Iterator[int]:
-    """In words; inline code counts as one. Each entry of a list is a paragraph."""
-    text = re.sub(r"\[([^\]]+)\]\([^)\s]*\)", r"\1", NO_SENTENCES.sub("", text))
-    for paragraph in re.split(r"\n\s*\n|\n(?=- |\d+\. )", re.sub("`[^`]+`", "code", text)):
-        for sentence in re.split(r"(?<=[.!?])\s+", paragraph):
-            if words_of := re.findall(r"\S*\w\S*", sentence):
-                yield len(words_of)
-
-
-@pytest.mark.parametrize(("names", "mean", "longest"), [(FIRST_READ, 16, 30), (READ, 18, 34)])
-def test_sentences_are_short(names: tuple[str, ...], mean: int, longest: int) -> None:
-    for page in (page for page in PAGES if page.stem in names):
-        lengths = list(lengths_of_sentences(TEXTS[page]))
-        assert statistics.mean(lengths) < mean, page.name
-        assert max(lengths) <= longest, page.name
-
-
 def test_pages_that_lead_the_reader_are_short() -> None:
-    for name in (*FIRST_READ[1:], *dict(guide.PAGES)["How to"]):
+    for name in ("tutorial", "reading", *dict(guide.PAGES)["How to"]):
         assert len(TEXTS[guide.FOLDER / f"{name}.md"].splitlines()) <= 120, name
 
 
@@ -542,7 +512,7 @@ SCREENS = ("cli.budget", "cli.check", "cli.disperse", "cli.loop", "cli.nothing",
            "cli.simulate", "glance", "loop.full", "loop.screen", "files.blocks-screen")  # fmt: skip
 OWN_NAMES = {"Sounder-1", "Sounder-1 (built-in example)", "Good", "Sat", "Tilted", "Upper", "T1",
          "+", "-", "+M1", "-M1", "+M2", "-M2", "Dated", "Weak",
-             "ZeroDivisionError", "ZXZ", "ZZX"}  # fmt: skip
+             "ZeroDivisionError", "ZXZ", "ZZX", "ICE"}  # fmt: skip
 """Names of spacecraft and channels in the files of those screens."""
 
 
@@ -607,6 +577,9 @@ def test_words_are_explained_however_they_are_written() -> None:
         "on-time s",
         "on_time_s",
         "nutation after, deg",
+        "spin axis: tilt",
+        "H: azimuth",
+        "H: right ascension",
     ):
         assert is_known(word), word
     assert explain.explained("on-time s").summary == explain.explained("On-Time").summary

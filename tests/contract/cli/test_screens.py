@@ -25,7 +25,6 @@ from support.process import Run
 from nutdamp.cli import files, job, main
 from nutdamp.cli.studies import stoppable
 from nutdamp.common import work
-from nutdamp.files.reader import example_text
 from nutdamp.planning import plan as planning
 from nutdamp.planning.tradeoff import Front, Point, Trade
 from nutdamp.spacecraft.model import Requirement
@@ -289,12 +288,12 @@ def test_default_screens_fit_their_width(
 def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> None:
     body = replace(spinner(channels=cross(8.0)), requirement=Requirement(nutation=0.01))
     plan = planning.plan(body, "two-pulse")
-    fronts = (Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 20) for at in range(5))
+    fronts = (Front(0.01 * at, (Point(plan, 60.0, "N m s"),) * 2) for at in range(50))
     traded = Trade(body, tuple(fronts))
     shown = "\n".join(printed(trade_screen(traded, verbose=False), WIDTH))
     assert measured(shown, WIDTH, 40) == {}
     rows = re.findall(r"^(\d+) .*FLY$", shown, re.MULTILINE)
-    assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "100")
+    assert (len(rows), rows[0], rows[-1]) == (ROWS, "1", "99")  # equal ones are shown once
     assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
     every = printed(trade_screen(traded, verbose=True), WIDTH)
     assert sum(bool(re.match(r"\d+ .*FLY$", line)) for line in every) == 100
@@ -395,20 +394,6 @@ def test_no_si_unit_with_a_us_one_is_left_on_a_screen(run: Run, command: str) ->
 @pytest.mark.parametrize("command", [*of_configs(LONG, FILES), *of_configs(LOOPS, LOOPED), *FITS])
 def test_nor_on_the_screens_of_long_studies(run: Run, command: str) -> None:
     expect_replaced(run, command)
-
-
-def test_tanks_and_tolerances_are_shown_in_us_units(run: Run, tmp_path: Path) -> None:
-    """Pressure and propellant of a tank, and tolerances in their own units."""
-    (tmp_path / "s.yaml").write_text(
-        example_text() + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}\n",
-        encoding="utf-8",
-    )
-    shown = run(
-        "check", "s.yaml", "-v", "--units", "us", "--set", "mass=250 kg", columns=120
-    ).stdout
-    assert re.search(r"^0 +319.1 psi", shown, re.MULTILINE)
-    assert re.search(r"^66.14 +116 psi", shown, re.MULTILINE)
-    assert not SI_UNITS.findall(shown)
 
 
 @pytest.mark.parametrize(

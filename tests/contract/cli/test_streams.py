@@ -102,13 +102,6 @@ def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> N
     assert "A|?0|" in ended.stdout
 
 
-def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
-    for command in ("plan", "check", "simulate --scheme two-pulse"):
-        assert not [
-            line for line in call(run, command).stdout.splitlines() if line != line.rstrip()
-        ]
-
-
 # --- disks and signals
 # ------------------------------------------------------------------------------------------------
 
@@ -238,43 +231,6 @@ def test_sigterm_while_a_file_is_written_leaves_what_was_there(tmp_path: Path) -
 
 # --- names that look like markup, control the terminal, or are not UTF-8
 # ----------------------------------------------
-
-MARKUP = """
-name: "[red]Evil[/] [/] :rocket:"
-inertia: {A: 120, C: 80}
-state: {spin: 30 rpm, nutation: 5 deg}
-thrusters:
-  - {name: "[red]", torque: [8, 0, 0]}
-  - {name: "[/]", torque: [0, 8, 0]}
-  - {name: ":rocket:", torque: [-8, 0, 0]}
-dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
-"""
-
-
-@spread(
-    "command",
-    [
-        "check",
-        "plan --scheme one-pulse",
-        "simulate --scheme one-pulse",
-        "disperse --scheme one-pulse --case 1",
-        "verify",
-        "plan --robust --scheme one-pulse",
-        "trade --points 1",
-        "disperse --samples 100",
-    ],
-    quick=4,
-)
-def test_names_that_look_like_markup_are_shown_as_they_are(run: Run, command: str) -> None:
-    ended = call(run, f"{command} -", stdin=MARKUP)
-    assert "Traceback" not in ended.stderr
-    assert "[red]Evil[/] [/] :rocket:" in ended.stdout
-    if command == "check":
-        lines = ended.stdout.splitlines()
-        assert all(
-            any(line.startswith(f"{name}  ") for line in lines)
-            for name in ("[red]", "[/]", ":rocket:")
-        )
 
 
 HOSTILE = "\x1b]0;PWNED\x07\x1b[2J\x9b31m"

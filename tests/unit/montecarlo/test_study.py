@@ -74,7 +74,7 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Goal, Inertia, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, on_command, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
-from nutdamp.views.tolerances import in_words, size_text
+from nutdamp.views.dispersion import in_words, size_text
 
 MANY = BLOCK + 5_234
 JETS = dispersed.with_jets()

@@ -42,8 +42,8 @@ from nutdamp.spacecraft.requirements import bounds
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views import text
+from nutdamp.views.dispersion import stated_text
 from nutdamp.views.robust import robust_json, robust_notes
-from nutdamp.views.tolerances import stated_text
 
 share_of = partial(normal, relative=True)
 EXACT = Dispersions(A=share_of(0.002))

@@ -163,6 +163,11 @@ def test_columns_of_a_default_screen_go_by_their_rank(width: int, heads: list[li
     lines = [line.split() for line in printed(table, width)]
     assert lines[:-2] == heads
     assert [line[0] for line in lines[-2:]] == ["one-pulse", "two-pulse"]
+    table.told = True
+    shown = {word for head in heads for word in head}
+    out = [name for name in ("pulses", "end s", "shift") if name.split()[0] not in shown]
+    last = printed(table, width)[len(lines) :]
+    assert " ".join(last).startswith(f"left out: {', '.join(out)}") if out else not last
 
 
 def test_without_a_rank_columns_go_on_below_and_nothing_is_lost() -> None:
