@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp.figures import geometry, sphere, style
-from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN, TURNED
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
@@ -181,12 +181,11 @@ def _axis_track(
     path, momentum = geometry.sky_paths(flight, track)
     target = geometry.sky_target(flight, track)
     _path(axes, flight, track, path)
-    places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
+    _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     style.target(axes, target)
     for name, outline in outlines.items():
         axes.plot(*outline.T, **ACCEPTED[name])
     style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
-    style.add(axes, "H", places[0], TURNED, role="vital")
     x, y, sense = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
 
@@ -198,10 +197,8 @@ ACCEPTED: dict[str, dict[str, Any]] = {
 """Looks of the lines of `studies.accepted`."""
 
 
-def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
-    """The path of H, (n, 2) degrees, with its places at first and after each firing, which are
-    returned.
-    """
+def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> None:
+    """The path of H, (n, 2) degrees, with its places at first and after each firing."""
     axes.plot(*geometry.once(momentum).T, label="path of H", **style.PATH_OF_H)
     stations = [momentum[:1]]
     numbered = style.thinned(len(flight.schedule), NUMBERED)
@@ -224,7 +221,6 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
         "zorder": 1.9,
     }  # under firings
     axes.plot(*places[marked].T, "+", label="H", **look)
-    return places
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
@@ -275,7 +271,7 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
             if len(firings) <= SPARSE or number in numbered
         ]
         axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
-    axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
+    axes.plot(*points[0], "o", color=MOTION, markersize=4.5, label="t = 0")
     axes.plot(
         *points[-1],
         "o",
@@ -285,9 +281,6 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         markeredgewidth=1.2,
         label="end",
     )
-    style.add(axes, "t = 0", points[0], INK, role="vital")
-    if firings:
-        style.add(axes, "end", points[-1], INK)
 
 
 def together(places: Sequence[Vector], width: float) -> list[list[int]]:
@@ -401,13 +394,19 @@ def firings_height(flight: Flight) -> list[float]:
 
 
 def course(flight: Flight, track: Track, *, outlines: Mapping[str, Vector], narrow: bool) -> Figure:
-    """Axis track above nutation, firings and changing spin; ``narrow``: for a phone."""
+    """Axis track beside nutation, firings and changing spin; ``narrow``: above them."""
     courses = _courses(flight, track, rates=False)
     sizes = [*courses.values()]
-    figure = style.sheet(style.PHONE if narrow else 5.2, 4.4 + sum(sizes))
-    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.4, *sizes])
-    _axis_track(figure.add_subplot(grid[0]), flight, track, outlines)
-    _draw_courses(figure, [grid[row + 1] for row in range(len(sizes))], flight, track, courses)
+    if narrow:
+        figure = style.sheet(style.PHONE, 4.4 + sum(sizes))
+        grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.4, *sizes])
+        track_cell, cells = grid[0], [grid[row + 1] for row in range(len(sizes))]
+    else:
+        figure = style.sheet(7.4, max(4.6, 1.4 + sum(sizes)))
+        grid = figure.add_gridspec(len(sizes), 2, height_ratios=sizes)
+        track_cell, cells = grid[:, 0], [grid[row, 1] for row in range(len(sizes))]
+    _axis_track(figure.add_subplot(track_cell), flight, track, outlines)
+    _draw_courses(figure, cells, flight, track, courses)
     return figure
 
 

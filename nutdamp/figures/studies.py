@@ -62,10 +62,12 @@ PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
-def dispersion_figure(flown: Dispersion, name: str = "overview") -> Figure:
-    """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
+def dispersion_figure(flown: Dispersion, name: str = "overview", *, narrow: bool = False) -> Figure:
+    """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others. ``narrow``:
+    the last one for phones.
+    """
     how = f"{flown.plan.scheme} by {model_name([flown.core.study.model.schedule])}"
-    return _figure(flown.core, flown.verdict, name, how)
+    return _figure(flown.core, flown.verdict, name, how, narrow=narrow)
 
 
 def loop_cases_figure(flown: LoopDispersion) -> Figure:
@@ -76,10 +78,13 @@ def loop_cases_figure(flown: LoopDispersion) -> Figure:
 
 
 @style.styled()
-def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str) -> Figure:
+def _figure(
+    results: Results | LoopResults, judged: Verdict, name: str, how: str, *, narrow: bool = False
+) -> Figure:
     panels = PANELS[name]
     spacecraft = results.study.model.spacecraft
-    figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
+    width = style.PHONE if narrow else (4.1, 7.4, 10.8)[panels - 1]
+    figure = style.sheet(width, 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
         _cases(axes[:2], results, judged)
@@ -297,7 +302,7 @@ def acceptance_figure(
     judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
 ) -> Figure:
     """The box of `acceptance`, for the report and ``plan --figure box``."""
-    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
+    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4 if narrow else 3.6)
     acceptance(figure.subplots(), judged, others)
     style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
     style.settle(figure)
@@ -327,7 +332,7 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
     look: dict[str, Any] = {**style.LIMIT, "label": None}
     axes.fill_between([0.0, corner[0]], corner[1], color=GREY, alpha=0.12, linewidth=0.0)
     axes.plot([corner[0], corner[0], 0.0], [0.0, corner[1], corner[1]], **look)
-    labels: dict[tuple[float, ...], list[str]] = {}
+    labels: dict[tuple[float, ...], list[tuple[str, str]]] = {}
     for verdict, colour, region in reversed(regions):
         recommended = verdict is judged
         solid = "-" if verdict.met is not False else (0, (4, 1.5))
@@ -348,7 +353,7 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
             look = {"color": colour, "markersize": 7, "markerfacecolor": ground, "clip_on": False}
             axes.plot(*place, mark, zorder=3, **look)
             spot = tuple((np.round(place / ends * SPOTS) / SPOTS * ends).tolist())
-            labels.setdefault(spot, []).append(name)
+            labels.setdefault(spot, []).append((name, colour))
         else:
             if recommended:
                 axes.fill(*region.T, color=colour, alpha=0.3, linewidth=0.0)
@@ -357,8 +362,10 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
             far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
             written_in = INK if recommended else colour  # on its own fill
             style.add(axes, name, np.minimum(far, 0.97 * ends), written_in, role="vital")
-    for spot, names in labels.items():
-        style.add(axes, "\n".join(reversed(names)), np.array(spot), INK, role="vital")
+    for spot, written_there in labels.items():
+        names, colours = zip(*reversed(written_there), strict=True)
+        colour = INK if len(names) > 1 else colours[0]
+        style.add(axes, "\n".join(names), np.array(spot), colour, role="vital")
     across, along = map(_bound_axis, bounds)
     axes.set(xlim=(0.0, ends[0]), ylim=(0.0, ends[1]), xlabel=across, ylabel=along)
     axes.locator_params(nbins=6)
@@ -455,6 +462,7 @@ CHOSEN: dict[str, Any] = {
     "markersize": 11,
     "markerfacecolor": "none",
     "linestyle": "",
+    "clip_on": False,
     "zorder": 4,
 }
 """Look of the mark of the recommended plan."""

@@ -313,13 +313,13 @@ def heading(
     verdict in colour.
     """
     whole = f"{short(spacecraft.name)}: {text}"
+    figure.set_label(whole)  # for pages, which break it by their own width, and have the verdict
     colour = INK
     if verdict is not None:
         whole = f"{whole}\n{verdict[0]}"
         colour = LIGHTS[verdict[1]]
     lines = (fill(line, int(LETTERS * figure.get_figwidth())) for line in whole.split("\n"))
     figure.suptitle("\n".join(lines), color=colour)
-    figure.set_label(whole)  # for pages, which break it by their own width
 
 
 def short(name: str) -> str:
@@ -387,7 +387,7 @@ def target(axes: Axes, places: Vector, name: str = "target") -> None:
 
 QUADRANTS = [
     (x * away, y * away)
-    for away in (3.5, 7.0, 12.0)
+    for away in (3.5, 7.0, 12.0, 24.0, 36.0)
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))
 ]
 """Offsets from a point to the nearest corner of its label, points."""
@@ -461,7 +461,7 @@ def _lay(axes: Axes, notes: Sequence[Annotation]) -> bool:
         outside = not (window.contains(*box.min) and window.contains(*box.max))
         crossed = sum(path.intersects_bbox(box, filled=False) for path in curves)
         return (
-            NO_ROOM * (outside + box.count_overlaps(taken))
+            NO_ROOM * (2 * outside + box.count_overlaps(taken))
             + ON_MARK * box.count_overlaps(marks)
             + crossed
         )

@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import BadRequest
-from nutdamp.views.tables import DataTable, Heading, Shared
+from nutdamp.views.tables import DataTable, FittedColumns, Heading, Shared
 from nutdamp.views.text import sentence
 
 if TYPE_CHECKING:
@@ -81,14 +81,14 @@ class Points(NamedTuple):
 
 class Picture(NamedTuple):
     """An ``<svg>`` element, its title, if any, a caption, a description, and the ``narrow`` drawing
-    for a phone, if any.
+    for a phone.
     """
 
     svg: str
     title: str
     caption: str
     described: str
-    narrow: str = ""
+    narrow: str
 
 
 class Listing(NamedTuple):
@@ -348,10 +348,11 @@ def sheet(table: DataTable, place: str = "page", **look: Any) -> Sheet:
 
 def sheet_of(title: str, table: Table) -> Sheet:
     """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
+    ranks = table.ranks if isinstance(table, FittedColumns) else (0,) * len(table.columns)
     columns = []
-    for column in table.columns:
+    for column, rank in zip(table.columns, ranks, strict=True):
         name, _, unit = plain(column.header).partition("\n")
-        columns.append(Heading(name, unit, column.justify == "right"))
+        columns.append(Heading(name, unit, column.justify == "right", rank))
     first = columns[0]
     named = first._replace(name=first.name or "quantity")
     return Sheet(title, (named, *columns[1:]), _rows(table), bars=(Shared.LINEAR, Shared.CASES))

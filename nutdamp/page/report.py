@@ -507,8 +507,8 @@ def _versions() -> Iterator[tuple[str, str]]:
 
 PICTURES = {
     "course": (
-        "Axis track: the spin axis in space, with the places of the angular momentum H. Below: "
-        "nutation on a log axis with what is required, and the firings of each channel.",
+        "Axis track: the spin axis in space, with the places of the angular momentum H; "
+        "nutation on a log axis with what is required; the firings of each channel.",
         "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
     ),
     "acceptance": (
@@ -564,17 +564,19 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
 
 def dispersion_picture(dispersed: Dispersion) -> Picture:
     """Final directions of H in the cases of a study; raises MissingExtra."""
-    return _picture("momentum", studies.dispersion_figure(dispersed, "momentum"))
+    figures = (
+        studies.dispersion_figure(dispersed, "momentum", narrow=narrow) for narrow in (False, True)
+    )
+    return _picture("momentum", *figures)
 
 
-def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
+def _picture(name: str, figure: Figure, narrow: Figure) -> Picture:
     """A picture with its title as text of the page, and the ``narrow`` drawing for a phone; those
     of the first screen stand beside its headline and have no other.
     """
-    title = str(figure.get_label()) or figure.get_suptitle()
-    title = "" if name in FIRST else title
-    phone = "" if narrow is None else image.svg(narrow, titled=False)
-    return Picture(image.svg(figure, titled=False), title, *PICTURES[name], phone)
+    title = "" if name in FIRST else str(figure.get_label())
+    wide, phone = (image.svg(drawn, titled=False) for drawn in (figure, narrow))
+    return Picture(wide, title, *PICTURES[name], phone)
 
 
 EQUATIONS = (

@@ -222,6 +222,7 @@ def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
         style.TURNED,
         style.MISSED,
         style.UNCHECKED,
+        style.GREY,
     )
     assert set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", css)) == {
         colour.lower() for colour in used
