@@ -56,48 +56,30 @@ def flight_figure(
     flight: Flight,
     track: Track,
     judged: Verdict | None = None,
-    box: Callable[[Axes], None] | None = None,
-) -> Figure:
-    """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for
-    others.
-
-    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``box`` draws
-    the first panel of the overview of a plan, in place of the pole curve.
-    Raises MissingExtra without matplotlib.
-    """
-    draw = DRAWN[name]
-    return _finished(partial(draw, box=box) if draw is overview else draw, flight, track, judged)
-
-
-@style.styled()
-def course_figure(
-    flight: Flight,
-    track: Track,
-    judged: Verdict | None = None,
-    outlines: Mapping[str, Vector] = NO_OUTLINES,
     *,
+    box: Callable[[Axes], None] | None = None,
+    outlines: Mapping[str, Vector] = NO_OUTLINES,
     narrow: bool = False,
 ) -> Figure:
-    """Axis track with the ``outlines`` of `studies.accepted` above nutation and firings, as on the
-    first screen of the report; ``narrow``: for a phone.
+    """The figure ``overview``, ``motion`` or ``course``, that of the first screen of the report,
+    with the verdict on its plan; raises KeyError for others.
+
+    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``box`` draws
+    the first panel of the overview of a plan, in place of the pole curve. A course has the
+    ``outlines`` of `studies.accepted` on its axis track; ``narrow``: it is for a phone.
+    Raises MissingExtra without matplotlib.
     """
-    draw = partial(course, outlines=outlines, narrow=narrow)
-    return _finished(draw, flight, track, judged)
-
-
-def _finished(
-    draw: Callable[[Flight, Track], Figure], flight: Flight, track: Track, judged: Verdict | None
-) -> Figure:
-    """A figure of as many rows as it needs, with its heading and its labels in place."""
+    drawings: dict[str, Callable[[Flight, Track], Figure]] = {
+        "overview": partial(overview, box=box),
+        "motion": motion,
+        "course": partial(course, outlines=outlines, narrow=narrow),
+    }
+    draw = drawings[name]
     seen = geometry.drawn(flight, track)
-    figure = draw(flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
-    style.heading(
-        figure, flight.spacecraft, title(flight) + part, None if judged is None else stated(judged)
-    )
-    style.settle(figure)
-    return figure
+    told = None if judged is None else stated(judged)
+    return style.finished(draw(flight, seen), flight.spacecraft, title(flight) + part, told)
 
 
 def title(flight: Flight) -> str:
@@ -214,13 +196,15 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
         for row in range(len(places))
         if len(places) <= SPARSE or row == 0 or row - 1 in numbered
     ]
-    look: dict[str, Any] = {
-        "color": MOMENTUM,
-        "markersize": 8,
-        "markeredgewidth": 1.4,
-        "zorder": 1.9,
-    }  # under firings
-    axes.plot(*places[marked].T, "+", label="H", **look)
+    axes.plot(
+        *places[marked].T,
+        "+",
+        label="H",
+        color=MOMENTUM,
+        markersize=8,
+        markeredgewidth=1.4,
+        zorder=1.9,  # under firings
+    )
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
@@ -437,7 +421,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
         0.5 * min(float(angles.min()), bound, 0.1 * most), min(most * 10.0**-DECADES, 0.1 * bound)
     )
     if limit is not None:
-        axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
+        axes.axhspan(0.0, limit, zorder=0.4, **style.BAND)
         axes.axhline(limit, **style.LIMIT)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
     _bands(axes, flight, track)
@@ -452,6 +436,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
+    """Rates across the axis."""
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
     for row, (name, colour, dashes) in enumerate(RATES):
@@ -459,34 +444,34 @@ def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
             track.t, rates[:, row], color=colour, linewidth=width, linestyle=dashes, label=name
         )
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
-    axes.set_ylim(-half, half)
+    axes.set(ylim=(-half, half), ylabel="ω1, ω2, °/s")
     _bands(axes, flight, track)
-    axes.set_ylabel("ω1, ω2, °/s")
-    axes.grid()
 
 
 def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
-    spin = np.degrees(track.rates[:, 2])
-    axes.plot(track.t, spin, color=MOTION, label="_ω3")
+    """Rate about the axis."""
+    axes.plot(track.t, np.degrees(track.rates[:, 2]), color=MOTION, label="_ω3")
     axes.margins(y=0.12)
-    _bands(axes, flight, track)
-    axes.set_ylabel("ω3, °/s")
-    axes.grid()
     axes.locator_params(axis="y", nbins=3)
+    axes.set_ylabel("ω3, °/s")
+    _bands(axes, flight, track)
 
 
 def _bands(axes: Axes, flight: Flight, track: Track) -> None:
-    """Time axis, and bands of the firings."""
+    """Time axis, grid, and bands of the firings."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)
-    look: dict[str, Any] = {
-        "facecolor": (PULSE, 0.25),
-        "edgecolor": PULSE,
-        "linewidth": 0.6,
-        "zorder": 0.5,
-    }
+    axes.grid()
     for number, block in enumerate(geometry.blocks(flight, until)):
-        axes.axvspan(block.begins, block.ends, label=None if number else "firing", **look)
+        axes.axvspan(
+            block.begins,
+            block.ends,
+            label=None if number else "firing",
+            facecolor=(PULSE, 0.25),
+            edgecolor=PULSE,
+            linewidth=0.6,
+            zorder=0.5,
+        )
 
 
 def firings(axes: Axes, flight: Flight, until: float) -> None:
@@ -547,4 +532,4 @@ def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> No
     style.add(axes, f"{block.name}: {how}", place, INK, role="bar")
 
 
-DRAWN = {"overview": overview, "motion": motion}
+FIGURES = ("overview", "motion")  # those that `plan --figure` draws of any flight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
@@ -72,6 +72,9 @@ LIMIT: dict[str, Any] = {
     "zorder": 1.5,
 }
 """Look of a bound of the requirement."""
+
+BAND: dict[str, Any] = {"facecolor": GREY, "alpha": 0.16, "linewidth": 0.0}
+"""Look of what keeps a bound, and of a dead band."""
 
 PAPER = "#fefefe"
 """Ground under a hollow mark; in a page, its background."""
@@ -278,8 +281,8 @@ def log_angles(axes: Axes, low: float, high: float) -> None:
 
 def off_scale(axes: Axes, text: str) -> None:
     """An arrow at the right edge of a panel towards a limit beyond it, with its ``text``."""
-    look: dict[str, Any] = {"ha": "right", "va": "bottom", "color": INK, "fontsize": SMALL}
-    axes.text(0.99, 0.02, f"{text} →", transform=axes.transAxes, **look)
+    place = axes.transAxes
+    axes.text(0.99, 0.02, f"{text} →", transform=place, ha="right", color=INK, fontsize=SMALL)
 
 
 def number(value: float) -> str:
@@ -302,15 +305,23 @@ def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
     )
 
 
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5, 1, 1.5)), (0, (5, 1.5)), ":")
+LOOKS = tuple(
+    (colour, mark, _DASHES[(row + turn) % len(_DASHES)])
+    for turn in range(3)
+    for row, (colour, mark) in enumerate(((MOTION, "o"), (MOMENTUM, "^"), (INK, "s"), (GREY, "v")))
+)
+"""Colour, mark and line of curves of one kind, in turn: those beside each other differ in all."""
+
 LETTERS = 11.0  # bold letters of a heading that fit in an inch
 LONGEST_NAME = 40  # characters of a name that fit above a picture
 
 
-def heading(
+def finished(
     figure: Figure, spacecraft: Spacecraft, text: str, verdict: tuple[str, Light] | None = None
-) -> None:
-    """The lines above a picture, broken by its width: the name of the spacecraft, ``text``, a
-    verdict in colour.
+) -> Figure:
+    """The figure with the lines above it, broken by its width: the name of the spacecraft,
+    ``text``, a verdict in colour; and with all labels in their places.
     """
     whole = f"{short(spacecraft.name)}: {text}"
     figure.set_label(whole)  # for pages, which break it by their own width, and have the verdict
@@ -320,6 +331,8 @@ def heading(
         colour = LIGHTS[verdict[1]]
     lines = (fill(line, int(LETTERS * figure.get_figwidth())) for line in whole.split("\n"))
     figure.suptitle("\n".join(lines), color=colour)
+    settle(figure)
+    return figure
 
 
 def short(name: str) -> str:
@@ -328,7 +341,7 @@ def short(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
 
 
-def legend(figure: Figure, axes: Sequence[Axes], columns: int = 8) -> None:
+def legend(figure: Figure, axes: Iterable[Axes], columns: int = 8) -> None:
     """One legend under all panels, each name once, where no curve can run into it, in as many
     columns as fit.
     """

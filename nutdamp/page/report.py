@@ -55,7 +55,7 @@ from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import NO_NUTATION, Plan
 from nutdamp.planning.simulation import unrounded
 from nutdamp.planning.tradeoff import Front, Trade
-from nutdamp.planning.verdict import Light, Line, Verdict
+from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import glance, guide
 from nutdamp.views import verdict as verdicts
@@ -107,7 +107,7 @@ def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no
     other script.
     """
-    moves = any(isinstance(block, document.Moving) for block in page.motion)
+    moves = page.motion is not None
     style, script = (
         "\n".join(
             files("nutdamp.page").joinpath(name).read_text("utf-8").strip()
@@ -152,7 +152,7 @@ def _templates() -> Environment:
     environment.filters["css"] = lambda text: re.sub(
         "[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text
     )
-    environment.filters.update(labelled=_labelled, whole=_whole)
+    environment.filters.update(labelled=_labelled, whole=_whole, number=document.number_in)
     return environment
 
 
@@ -288,31 +288,22 @@ def report_page(
                 broken=tuple(broken),
                 state=Light.AMBER.value if broken and judged.light is Light.GREEN else page.state,
                 bounds=document.sheet(verdicts.bound_table(judged)),
-                bars=tuple(_bar(line) for line in judged.lines),
+                lines=tuple(judged.lines),
                 pulses=_fired(chosen),
                 count=len(chosen.pulses.blocks) or len(chosen.pulses),
                 facts=document.facts_of("Final state, after the last pulse", glance.ends(chosen)),
                 acceptance=acceptance_picture(compared),
                 warnings=(*warnings, *broken),
-                motion=(
-                    moving_of(
-                        chosen,
-                        repeat.craft(built_in=spacecraft.built_in),
-                        studies.accepted(chosen._flight, judged),
-                    ),
-                    document.Beside((flight_picture(chosen, judged),), still=True),
+                motion=moving_of(
+                    chosen,
+                    repeat.craft(built_in=spacecraft.built_in),
+                    studies.accepted(chosen._flight, judged),
                 ),
+                still=flight_picture(chosen, judged),
             )
         task.reach(1.0)
         sections = _sections(compared, judged, repeat, page, traded, notes[NOTES:])
         return replace(page, sections=tuple(sections))
-
-
-def _bar(line: Line) -> document.Bar:
-    """Bar of a bound."""
-    dispersed = math.nan if line.dispersed is None else float(line.bound.used(line.dispersed))
-    nominal = float(line.bound.used(line.nominal))
-    return document.Bar(nominal, dispersed, line.met, line.bound.inner)
 
 
 SHOWN = 8  # pulses on the first screen; of more the first and the last
@@ -538,7 +529,7 @@ def flight_picture(plan: Plan, judged: Verdict) -> Picture:
     flown, track = overview.shown(plan)
     outlines = studies.accepted(flown, judged)
     figures = (
-        overview.course_figure(flown, track, judged, outlines, narrow=narrow)
+        overview.flight_figure("course", flown, track, judged, outlines=outlines, narrow=narrow)
         for narrow in (False, True)
     )
     return _picture("course", *figures)

@@ -198,8 +198,6 @@ def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pu
 
 def figure_of(name: str, flight: Flight, track: Track) -> Figure:
     """One of `NAMES`."""
-    if name == "course":
-        return overview.course_figure(flight, track)
     return overview.flight_figure(name, flight, track)
 
 

@@ -622,12 +622,13 @@ def test_no_stop_of_the_keyboard_does_nothing(tab: Browse) -> None:
     with tab(BUILT_IN, 1280) as page:
         assert set(page.evaluate(stops)) == {"SUMMARY"}
     with tab(BUILT_IN, 400) as page:
+        page.locator("#background summary", has_text="Pulses").click()  # a table with all values
         page.wait_for_function("document.querySelectorAll('.wide[tabindex]').length > 0")
         assert page.evaluate(
             "[...document.querySelectorAll('.wide[tabindex]')]"
             ".every((one) => one.scrollWidth > one.clientWidth)"
         )
-        box = page.locator("#schemes .wide").first
+        box = page.locator("#background .wide[tabindex]").first
         assert box.get_attribute("aria-label")
         box.focus()
         for _ in range(5):

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import places
+from support.builders import present
 from support.cases import spread
 from support.process import Run, plain_page
 from support.shown import compared_text
@@ -24,6 +25,7 @@ from nutdamp.flight import propagation
 from nutdamp.page.document import Moving
 from nutdamp.page.moving import EDITED, moving_of
 from nutdamp.page.report import page_html
+from nutdamp.physics.attitude import angle_between
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Goal
 from nutdamp.spacecraft.schedule import Schedule
@@ -53,7 +55,7 @@ requirement: {nutation: 0.5 deg}
 FILES = {
     "example": EXAMPLE,
     "target": places.case("far-target.yaml").read_text(encoding="utf-8"),
-    "nearby": NEARBY,
+    "nearby": NEARBY + "sun: [100 deg, 10 deg]\n",
     "flat": FLAT,
     **{
         name: (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
@@ -87,7 +89,7 @@ def paged(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Moving], Path]:
     bare = plain_page(compared_text(EXAMPLE))
 
     def page(view: Moving) -> Path:
-        made = replace(bare, motion=(view,), sections=())
+        made = replace(bare, motion=view, sections=())
         path = folder / f"{len(list(folder.iterdir()))}.html"
         path.write_text(page_html(made), encoding="utf-8")
         return path
@@ -217,6 +219,11 @@ def test_a_changed_motion_is_drawn_as_it_is_flown(browse: Browse, written: Any, 
                 if framed
                 else np.arctan2(np.hypot(x, y), z),
             }
+            for number, keep in enumerate(plan.spacecraft.watched, 1):
+                direction = present(keep.direction)
+                angles[f"aspect{number}"] = [
+                    float(angle_between(track.axis[-1], direction)) for track in near
+                ]
             for name_, values in angles.items():
                 angle = float(part(page, name_).text_content().removesuffix("°"))
                 assert np.degrees(min(values)) - 6e-5 <= angle <= np.degrees(max(values)) + 6e-5
