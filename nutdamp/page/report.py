@@ -15,7 +15,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -528,20 +528,14 @@ def flight_picture(plan: Plan, judged: Verdict) -> Picture:
     """
     flown, track = overview.shown(plan)
     outlines = studies.accepted(flown, judged)
-    figures = (
-        overview.flight_figure("course", flown, track, judged, outlines=outlines, narrow=narrow)
-        for narrow in (False, True)
-    )
-    return _picture("course", *figures)
+    draw = partial(overview.flight_figure, "course", flown, track, judged, outlines=outlines)
+    return _picture("course", draw)
 
 
 def acceptance_picture(compared: Comparison) -> Picture:
     """Schemes beside the limits; raises MissingExtra."""
-    figures = (
-        studies.acceptance_figure(compared.verdict, compared.others, narrow=narrow)
-        for narrow in (False, True)
-    )
-    return _picture("acceptance", *figures)
+    draw = partial(studies.acceptance_figure, compared.verdict, compared.others)
+    return _picture("acceptance", draw)
 
 
 def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
@@ -549,24 +543,21 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     MissingExtra.
     """
     traded = Trade(compared.spacecraft, tuple(fronts), compared.recommended)
-    figures = (studies.trade_figure(traded, narrow=narrow) for narrow in (False, True))
-    return _picture("trade", *figures)
+    return _picture("trade", partial(studies.trade_figure, traded))
 
 
 def dispersion_picture(dispersed: Dispersion) -> Picture:
     """Final directions of H in the cases of a study; raises MissingExtra."""
-    figures = (
-        studies.dispersion_figure(dispersed, "momentum", narrow=narrow) for narrow in (False, True)
-    )
-    return _picture("momentum", *figures)
+    return _picture("momentum", partial(studies.dispersion_figure, dispersed, "momentum"))
 
 
-def _picture(name: str, figure: Figure, narrow: Figure) -> Picture:
+def _picture(name: str, draw: Callable[..., Figure]) -> Picture:
     """A picture with its title as text of the page, and the ``narrow`` drawing for a phone; those
     of the first screen stand beside its headline and have no other.
     """
-    title = "" if name in FIRST else str(figure.get_label())
-    wide, phone = (image.svg(drawn, titled=False) for drawn in (figure, narrow))
+    figures = [draw(narrow=narrow) for narrow in (False, True)]
+    title = "" if name in FIRST else str(figures[0].get_label())
+    wide, phone = (image.svg(figure, titled=False) for figure in figures)
     return Picture(wide, title, *PICTURES[name], phone)
 
 

@@ -1199,6 +1199,7 @@ def test_the_scripts_are_small(name: str) -> None:
     [
         ("dissipation: {time_constant: 600 s}", "energy dissipation"),
         ("disturbances: [{torque: [20 mN m, 0, 0]}]", "disturbance torques"),
+        ("wheel: {momentum: 1 N m s}", "a wheel"),
         deep("tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}", "blowdown"),
         deep("cold: {first: 90 %, pulses: 4}", "cold pulses"),
         deep(
@@ -1213,14 +1214,15 @@ def test_other_bodies_have_none_and_the_view_has_the_reason(more: str, reason: s
     assert data["bench"] is None
 
 
-def test_schedules_without_pulses_command_blocks_and_wheels_have_none() -> None:
+def test_schedules_without_pulses_and_command_blocks_have_none() -> None:
     plan = chosen(TEXTS["three"])
-    assert moving.absence(plan.spacecraft, plan.pulses) == ""
-    assert moving.absence(plan.spacecraft, Schedule()) == "no pulses"
     blocks = replace(plan.pulses, blocks=(Block("T1", 1, 0.1, 0.1, 3),))
-    assert moving.absence(plan.spacecraft, blocks) == "command blocks"
-    inertia = replace(plan.spacecraft.inertia, wheel=1.0)
-    assert moving.absence(replace(plan.spacecraft, inertia=inertia), plan.pulses) == "a wheel"
+    for schedule, reason in (
+        (plan.pulses, ""),
+        (Schedule(), "no pulses"),
+        (blocks, "command blocks"),
+    ):
+        assert moving.absence(plan.spacecraft, schedule) == reason
 
 
 def test_cones_roll_on_a_symmetric_body_alone() -> None:
