@@ -77,14 +77,10 @@ def svg(figure: Figure, *, titled: bool = True) -> str:
     Its ids begin with a digest of its content: several may be in one page. Not ``titled``: without
     the line above it, which is text of the page.
     """
-    width = POINTS * figure.get_figwidth()
-    height = POINTS * figure.get_figheight()
+    width, height = POINTS * figure.get_size_inches()
     top = 0.0
     title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
     if title is not None and not titled:
-        if (engine := figure.get_layout_engine()) is not None:
-            engine.execute(figure)
-        figure.set_layout_engine(None)  # which would move the panels to where the title was
         top = height - POINTS * title.get_window_extent().y0 / figure.dpi
         title.set_visible(False)
     stream = io.StringIO()
