@@ -215,8 +215,7 @@ def _residuals(axes: Axes, fit: Fit, index: int) -> None:
     noise = float(fit.noise[index])
     axes.set_ylabel(f"{fit.model.signals[index]}, {unit}")
     if _rounding(fit, index):
-        axes.text(0.5, 0.5, "only rounding", transform=axes.transAxes, ha="center", va="center")
-        axes.set_yticks([])
+        style.words(axes, "only rounding")
         return
     limit = factor * SPREAD * noise
     left = np.clip(factor * fit.residuals[rows], -limit, limit)

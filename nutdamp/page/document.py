@@ -59,14 +59,13 @@ class Points(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """An ``<svg>`` element, its title, if any, a caption, a description, and the ``narrow`` drawing
-    for a phone.
+    """A title, if any, a caption, and two ``<svg>`` elements: that for wide screens and paper, and
+    the ``narrow`` one for a phone.
     """
 
-    svg: str
     title: str
     caption: str
-    described: str
+    svg: str
     narrow: str
 
 

@@ -107,7 +107,7 @@ def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no
     other script.
     """
-    moves = page.motion is not None
+    moves = isinstance(page.motion, document.Moving)
     style, script = (
         "\n".join(
             files("nutdamp.page").joinpath(name).read_text("utf-8").strip()
@@ -152,7 +152,7 @@ def _templates() -> Environment:
     environment.filters["css"] = lambda text: re.sub(
         "[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text
     )
-    environment.filters.update(labelled=_labelled, whole=_whole, number=document.number_in)
+    environment.filters.update(whole=_whole, number=document.number_in)
     return environment
 
 
@@ -169,13 +169,6 @@ def _whole(text: str) -> Markup:
     parts = [escape(part) for part in WHOLE.split(text)]
     parts[1::2] = [f'<span class="whole-word">{part}</span>' for part in parts[1::2]]
     return Markup("".join(parts))
-
-
-def _labelled(svg: str, described: str) -> Markup:
-    """A picture with its description for those who do not see it."""
-    from markupsafe import Markup
-
-    return Markup(svg.replace("<svg ", f'<svg aria-label="{escape(described)}" ', 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -557,8 +550,8 @@ def _picture(name: str, draw: Callable[..., Figure]) -> Picture:
     """
     figures = [draw(narrow=narrow) for narrow in (False, True)]
     title = "" if name in FIRST else str(figures[0].get_label())
-    wide, phone = (image.svg(figure, titled=False) for figure in figures)
-    return Picture(wide, title, *PICTURES[name], phone)
+    caption, described = PICTURES[name]
+    return Picture(title, caption, *(image.svg(figure, described) for figure in figures))
 
 
 EQUATIONS = (

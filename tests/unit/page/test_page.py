@@ -42,7 +42,6 @@ from nutdamp.page import moving
 from nutdamp.page.document import (
     Control,
     Moving,
-    PageSection,
     Prose,
     Sheet,
     blocks_of,
@@ -1052,9 +1051,7 @@ def test_dates_are_exact_through_a_leap_second_and_without_an_epoch_there_are_no
 def test_a_page_has_the_view_and_its_script_where_it_has_pictures() -> None:
     plain = plain_page(compared_text(TEXTS["single"], samples=None))
     assert "requestAnimationFrame" not in page_html(plain)
-    page = tree(
-        replace(plain, sections=(PageSection("pictures", "Pictures", (view(TEXTS["single"])[0],)),))
-    )
+    page = tree(replace(plain, motion=view(TEXTS["single"])[0], sections=()))
     (shown,) = (node for node in page if "moving" in node.attributes.get("class", "").split())
     assert "UTC" not in shown.text
 
