@@ -461,7 +461,7 @@ def _bands(axes: Axes, flight: Flight, track: Track) -> None:
     """Time axis, grid, and bands of the firings."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)
-    axes.grid()
+    axes.grid(visible=True)
     for number, block in enumerate(geometry.blocks(flight, until)):
         axes.axvspan(
             block.begins,

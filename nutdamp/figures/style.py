@@ -276,7 +276,7 @@ def log_angles(axes: Axes, low: float, high: float) -> None:
     axes.set_ylim(low, high)
     log_axis(axes.yaxis)
     axes.set_ylabel("θ, ° (log)")
-    axes.grid()
+    axes.grid(visible=True)  # without the word it would turn off one that is there
 
 
 def off_scale(axes: Axes, text: str) -> None:
@@ -424,9 +424,8 @@ def settle(figure: Figure) -> None:
     """Lay out the panels, and each label where it covers least; take out those for which there is
     no room.
     """
-    for axes in (
-        figure.axes
-    ):  # drawn later outside this style, as many ticks fit between labels of the same size
+    for axes in figure.axes:
+        # Drawn later outside this style, as many ticks fit between labels of the same size.
         axes.tick_params(labelsize=TICK_SIZE)
         # They lie within the panel and its ticks.
         axes.spines[["left", "right", "top"]].set_in_layout(False)
