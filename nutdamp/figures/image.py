@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
+from html import escape
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
@@ -70,21 +71,18 @@ def rendered(figure: Figure, path: str) -> bytes:
 
 
 @style.styled()
-def svg(figure: Figure, *, titled: bool = True) -> str:
+def svg(figure: Figure, described: str = "") -> str:
     """The figure as an inline ``<svg>`` element, as wide as its container, on no background.
 
     Text and frames take the colour of the text around it, so that it suits light and dark pages.
-    Its ids begin with a digest of its content: several may be in one page. Not ``titled``: without
-    the line above it, which is text of the page.
+    Its ids begin with a digest of its content: several may be in one page. One that is
+    ``described`` for those who do not see it has no line above it, which is text of the page.
     """
-    width = POINTS * figure.get_figwidth()
-    height = POINTS * figure.get_figheight()
+    width, height = POINTS * figure.get_size_inches()
     top = 0.0
     title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
-    if title is not None and not titled:
-        if (engine := figure.get_layout_engine()) is not None:
-            engine.execute(figure)
-        figure.set_layout_engine(None)  # which would move the panels to where the title was
+    label = f' aria-label="{escape(described)}"' if described else ""
+    if title is not None and described:
         top = height - POINTS * title.get_window_extent().y0 / figure.dpi
         title.set_visible(False)
     stream = io.StringIO()
@@ -100,8 +98,8 @@ def svg(figure: Figure, *, titled: bool = True) -> str:
     content = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", content)
     frame = f"0 {top:.1f} {width:.1f} {height - top:.1f}"
     return (
-        f'<svg {SPACES} viewBox="{frame}" width="100%" role="img" style="stroke-linejoin: '
-        f'round">{content}'
+        f'<svg {SPACES} viewBox="{frame}" width="100%" role="img"{label} '
+        f'style="stroke-linejoin: round">{content}'
     )
 
 

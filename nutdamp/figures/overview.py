@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp.figures import geometry, sphere, style
-from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN, TURNED
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
@@ -56,48 +56,30 @@ def flight_figure(
     flight: Flight,
     track: Track,
     judged: Verdict | None = None,
-    box: Callable[[Axes], None] | None = None,
-) -> Figure:
-    """The figure ``overview`` or ``motion``, with the verdict on its plan; raises KeyError for
-    others.
-
-    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``box`` draws
-    the first panel of the overview of a plan, in place of the pole curve.
-    Raises MissingExtra without matplotlib.
-    """
-    draw = DRAWN[name]
-    return _finished(partial(draw, box=box) if draw is overview else draw, flight, track, judged)
-
-
-@style.styled()
-def course_figure(
-    flight: Flight,
-    track: Track,
-    judged: Verdict | None = None,
-    outlines: Mapping[str, Vector] = NO_OUTLINES,
     *,
+    box: Callable[[Axes], None] | None = None,
+    outlines: Mapping[str, Vector] = NO_OUTLINES,
     narrow: bool = False,
 ) -> Figure:
-    """Axis track with the ``outlines`` of `studies.accepted` above nutation and firings, as on the
-    first screen of the report; ``narrow``: for a phone.
+    """The figure ``overview``, ``motion`` or ``course``, that of the first screen of the report,
+    with the verdict on its plan; raises KeyError for others.
+
+    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``box`` draws
+    the first panel of the overview of a plan, in place of the pole curve. A course has the
+    ``outlines`` of `studies.accepted` on its axis track; ``narrow``: it is for a phone.
+    Raises MissingExtra without matplotlib.
     """
-    draw = partial(course, outlines=outlines, narrow=narrow)
-    return _finished(draw, flight, track, judged)
-
-
-def _finished(
-    draw: Callable[[Flight, Track], Figure], flight: Flight, track: Track, judged: Verdict | None
-) -> Figure:
-    """A figure of as many rows as it needs, with its heading and its labels in place."""
+    drawings: dict[str, Callable[[Flight, Track], Figure]] = {
+        "overview": partial(overview, box=box),
+        "motion": motion,
+        "course": partial(course, outlines=outlines, narrow=narrow),
+    }
+    draw = drawings[name]
     seen = geometry.drawn(flight, track)
-    figure = draw(flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
-    style.heading(
-        figure, flight.spacecraft, title(flight) + part, None if judged is None else stated(judged)
-    )
-    style.settle(figure)
-    return figure
+    told = None if judged is None else stated(judged)
+    return style.finished(draw(flight, seen), flight.spacecraft, title(flight) + part, told)
 
 
 def title(flight: Flight) -> str:
@@ -181,12 +163,11 @@ def _axis_track(
     path, momentum = geometry.sky_paths(flight, track)
     target = geometry.sky_target(flight, track)
     _path(axes, flight, track, path)
-    places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
+    _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
     style.target(axes, target)
     for name, outline in outlines.items():
         axes.plot(*outline.T, **ACCEPTED[name])
     style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
-    style.add(axes, "H", places[0], TURNED, role="vital")
     x, y, sense = geometry.sky_names(flight)
     axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
 
@@ -198,10 +179,8 @@ ACCEPTED: dict[str, dict[str, Any]] = {
 """Looks of the lines of `studies.accepted`."""
 
 
-def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
-    """The path of H, (n, 2) degrees, with its places at first and after each firing, which are
-    returned.
-    """
+def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> None:
+    """The path of H, (n, 2) degrees, with its places at first and after each firing."""
     axes.plot(*geometry.once(momentum).T, label="path of H", **style.PATH_OF_H)
     stations = [momentum[:1]]
     numbered = style.thinned(len(flight.schedule), NUMBERED)
@@ -217,14 +196,15 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
         for row in range(len(places))
         if len(places) <= SPARSE or row == 0 or row - 1 in numbered
     ]
-    look: dict[str, Any] = {
-        "color": MOMENTUM,
-        "markersize": 8,
-        "markeredgewidth": 1.4,
-        "zorder": 1.9,
-    }  # under firings
-    axes.plot(*places[marked].T, "+", label="H", **look)
-    return places
+    axes.plot(
+        *places[marked].T,
+        "+",
+        label="H",
+        color=MOMENTUM,
+        markersize=8,
+        markeredgewidth=1.4,
+        zorder=1.9,  # under firings
+    )
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
@@ -275,7 +255,7 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
             if len(firings) <= SPARSE or number in numbered
         ]
         axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
-    axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
+    axes.plot(*points[0], "o", color=MOTION, markersize=4.5, label="t = 0")
     axes.plot(
         *points[-1],
         "o",
@@ -285,9 +265,6 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         markeredgewidth=1.2,
         label="end",
     )
-    style.add(axes, "t = 0", points[0], INK, role="vital")
-    if firings:
-        style.add(axes, "end", points[-1], INK)
 
 
 def together(places: Sequence[Vector], width: float) -> list[list[int]]:
@@ -401,13 +378,19 @@ def firings_height(flight: Flight) -> list[float]:
 
 
 def course(flight: Flight, track: Track, *, outlines: Mapping[str, Vector], narrow: bool) -> Figure:
-    """Axis track above nutation, firings and changing spin; ``narrow``: for a phone."""
+    """Axis track beside nutation, firings and changing spin; ``narrow``: above them."""
     courses = _courses(flight, track, rates=False)
     sizes = [*courses.values()]
-    figure = style.sheet(style.PHONE if narrow else 5.2, 4.4 + sum(sizes))
-    grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.4, *sizes])
-    _axis_track(figure.add_subplot(grid[0]), flight, track, outlines)
-    _draw_courses(figure, [grid[row + 1] for row in range(len(sizes))], flight, track, courses)
+    if narrow:
+        figure = style.sheet(style.PHONE, 4.4 + sum(sizes))
+        grid = figure.add_gridspec(1 + len(sizes), 1, height_ratios=[3.4, *sizes])
+        track_cell, cells = grid[0], [grid[row + 1] for row in range(len(sizes))]
+    else:
+        figure = style.sheet(7.4, max(4.6, 1.4 + sum(sizes)))
+        grid = figure.add_gridspec(len(sizes), 2, height_ratios=sizes)
+        track_cell, cells = grid[:, 0], [grid[row, 1] for row in range(len(sizes))]
+    _axis_track(figure.add_subplot(track_cell), flight, track, outlines)
+    _draw_courses(figure, cells, flight, track, courses)
     return figure
 
 
@@ -438,7 +421,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
         0.5 * min(float(angles.min()), bound, 0.1 * most), min(most * 10.0**-DECADES, 0.1 * bound)
     )
     if limit is not None:
-        axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
+        axes.axhspan(0.0, limit, zorder=0.4, **style.BAND)
         axes.axhline(limit, **style.LIMIT)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
     _bands(axes, flight, track)
@@ -453,6 +436,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
+    """Rates across the axis."""
     rates = np.degrees(track.rates)
     width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
     for row, (name, colour, dashes) in enumerate(RATES):
@@ -460,34 +444,34 @@ def _rate_history(axes: Axes, flight: Flight, track: Track) -> None:
             track.t, rates[:, row], color=colour, linewidth=width, linestyle=dashes, label=name
         )
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
-    axes.set_ylim(-half, half)
+    axes.set(ylim=(-half, half), ylabel="ω1, ω2, °/s")
     _bands(axes, flight, track)
-    axes.set_ylabel("ω1, ω2, °/s")
-    axes.grid()
 
 
 def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
-    spin = np.degrees(track.rates[:, 2])
-    axes.plot(track.t, spin, color=MOTION, label="_ω3")
+    """Rate about the axis."""
+    axes.plot(track.t, np.degrees(track.rates[:, 2]), color=MOTION, label="_ω3")
     axes.margins(y=0.12)
-    _bands(axes, flight, track)
-    axes.set_ylabel("ω3, °/s")
-    axes.grid()
     axes.locator_params(axis="y", nbins=3)
+    axes.set_ylabel("ω3, °/s")
+    _bands(axes, flight, track)
 
 
 def _bands(axes: Axes, flight: Flight, track: Track) -> None:
-    """Time axis, and bands of the firings."""
+    """Time axis, grid, and bands of the firings."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)
-    look: dict[str, Any] = {
-        "facecolor": (PULSE, 0.25),
-        "edgecolor": PULSE,
-        "linewidth": 0.6,
-        "zorder": 0.5,
-    }
+    axes.grid(visible=True)
     for number, block in enumerate(geometry.blocks(flight, until)):
-        axes.axvspan(block.begins, block.ends, label=None if number else "firing", **look)
+        axes.axvspan(
+            block.begins,
+            block.ends,
+            label=None if number else "firing",
+            facecolor=(PULSE, 0.25),
+            edgecolor=PULSE,
+            linewidth=0.6,
+            zorder=0.5,
+        )
 
 
 def firings(axes: Axes, flight: Flight, until: float) -> None:
@@ -548,4 +532,4 @@ def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> No
     style.add(axes, f"{block.name}: {how}", place, INK, role="bar")
 
 
-DRAWN = {"overview": overview, "motion": motion}
+FIGURES = ("overview", "motion")  # those that `plan --figure` draws of any flight

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from nutdamp.control_loop.evaluation import LoopPlan
 from nutdamp.figures import style
 from nutdamp.figures.geometry import ticks
 from nutdamp.figures.overview import EDGE, TIME, firings, firings_height, title
-from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
+from nutdamp.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.spacecraft import requirements
 from nutdamp.views.loop import described
 
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 SAMPLES = 3000  # rows of the nutation of a run
 DECADES = 5.0  # largest number of decades of the nutation on its log axis
 
-LINES = ((MOTION, "-"), (MOMENTUM, "--"), (GREY, "-."), (MOTION, ":"))
-"""Colour and style of the pairs of thresholds whose limit cycles are drawn."""
-
 PERIODS = 4.0  # cycles drawn of the longest limit cycle
 
 ROWS = 600
@@ -44,8 +41,9 @@ def loop_figure(plan: LoopPlan) -> Figure:
     unit, seconds = time_unit(run.until)
     heights = [2.6, *firings_height(run.flight)]
     figure = style.sheet(7.4, 1.8 + sum(heights))
-    shape: dict[str, Any] = {"height_ratios": heights, "sharex": True}
-    panels = figure.subplots(len(heights), 1, squeeze=False, **shape)[:, 0]
+    panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights, sharex=True)[
+        :, 0
+    ]
     _nutation(panels[0], plan)
     if run.fired:
         firings(panels[1], run.flight, run.until)
@@ -57,9 +55,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
     panels[-1].set_xlabel(f"time, {unit}")
     style.legend(figure, list(panels))
     loop = described(run.loop, thresholds=False).replace(" deg", "°")
-    style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
-    style.settle(figure)
-    return figure
+    return style.finished(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
 
 
 def time_unit(until: float) -> tuple[str, float]:
@@ -102,8 +98,7 @@ def _nutation(axes: Axes, plan: LoopPlan) -> None:
     axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
     if stop > 0.0:
         axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")
-    shade: dict[str, Any] = {"facecolor": GREY, "alpha": 0.16, "linewidth": 0.0}
-    axes.axhspan(0.1 * low, max(band, 0.1 * low), label="dead band", **shade)
+    axes.axhspan(0.1 * low, max(band, 0.1 * low), label="dead band", **style.BAND)
     style.log_angles(axes, low, 2.0 * most)
 
 
@@ -129,7 +124,8 @@ def budget_figure(budget: Budget) -> Figure:
     times = np.linspace(0.0, size, ROWS)
     free = np.degrees(requirements.idle(spacecraft, times))
     axes.plot(times / seconds, free, color=INK, label="no firing")
-    for (thresholds, cycle, period, begins), (colour, line) in zip(held, LINES, strict=False):
+    looks = style.LOOKS
+    for (thresholds, cycle, period, begins), (colour, _, line) in zip(held, looks, strict=False):
         low, high = math.degrees(cycle.low), math.degrees(cycle.high)
         rises = (
             min(requirements.reached(spacecraft, cycle.high, cycle.low), period)
@@ -150,8 +146,7 @@ def budget_figure(budget: Budget) -> Figure:
     axes.set(xlabel=f"time, {unit}", xlim=(0.0, size / seconds))
     style.legend(figure, [axes])
     how = "held by the limit cycle of the loop" if held else "without firing"
-    style.heading(figure, spacecraft, f"nutation under dissipation, {how}")
-    return figure
+    return style.finished(figure, spacecraft, f"nutation under dissipation, {how}")
 
 
 # standard deviations to either side that residuals are drawn to; outliers beyond are marked at the
@@ -162,11 +157,6 @@ ROUNDING = 1e-3
 """Share of the noise taken for the digits below which all residuals are rounding: of real noise
 some are above it.
 """
-
-LOOKS = tuple(
-    (colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in (MOTION, INK, MOMENTUM, GREY)
-)
-"""Colour and line of the signals in turn."""
 
 ROWS = 8  # labels of pulls that fit into half of the height
 FARTHEST = 6.0  # pulls beyond are drawn at the edge
@@ -211,10 +201,8 @@ def fit_figure(fitted: Fitted) -> Figure:
     style.legend(figure, [*left, *right])
     shape = "symmetric" if fit.model.body(fit.named).inertia.symmetric else "triaxial"
     count = int(np.count_nonzero(fit.used))
-    style.heading(
-        figure, fit.model.spacecraft, f"fit of a free rigid body, {shape}, to {count:,} samples"
-    )
-    return figure
+    about = f"fit of a free rigid body, {shape}, to {count:,} samples"
+    return style.finished(figure, fit.model.spacecraft, about)
 
 
 def _residuals(axes: Axes, fit: Fit, index: int) -> None:
@@ -227,8 +215,7 @@ def _residuals(axes: Axes, fit: Fit, index: int) -> None:
     noise = float(fit.noise[index])
     axes.set_ylabel(f"{fit.model.signals[index]}, {unit}")
     if _rounding(fit, index):
-        axes.text(0.5, 0.5, "only rounding", transform=axes.transAxes, ha="center", va="center")
-        axes.set_yticks([])
+        style.words(axes, "only rounding")
         return
     limit = factor * SPREAD * noise
     left = np.clip(factor * fit.residuals[rows], -limit, limit)
@@ -237,7 +224,7 @@ def _residuals(axes: Axes, fit: Fit, index: int) -> None:
     axes.plot(
         times[kept],
         left[kept],
-        color=LOOKS[index % len(LOOKS)][0],
+        color=style.LOOKS[index % len(style.LOOKS)][0],
         linestyle="",
         marker=".",
         markersize=2.0,
@@ -266,7 +253,7 @@ def _autocorrelation(axes: Axes, fit: Fit, shown: Sequence[int]) -> None:
     for index in shown:
         correlations = fit.whiteness(index)
         lags = np.arange(1, len(correlations) + 1)
-        colour, line = LOOKS[index % len(LOOKS)]
+        colour, _, line = style.LOOKS[index % len(style.LOOKS)]
         name = fit.model.signals[index]
         axes.plot(lags, correlations, color=colour, linestyle=line, linewidth=1.0, label=name)
         bands.append(1.96 / np.sqrt(int((fit.used & (fit.model.signal == index)).sum())))
@@ -294,14 +281,9 @@ def _pulls(axes: Axes, rows: list[Estimate]) -> None:
     sigmas = [min(row.sigma / (row.prior or 1.0), FARTHEST) for row in rows]
     axes.axvspan(-1.0, 1.0, facecolor=GREY, alpha=0.25, linewidth=0.0)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
-    look: dict[str, Any] = {
-        "fmt": "o",
-        "color": MOTION,
-        "markersize": 4,
-        "elinewidth": 1.2,
-        "capsize": 2.0,
-    }
-    axes.errorbar(changes, places, xerr=sigmas, **look)
+    axes.errorbar(
+        changes, places, xerr=sigmas, fmt="o", color=MOTION, markersize=4, elinewidth=1.2, capsize=2
+    )
     reach = max(2.0, 1.1 * float((np.abs(changes) + sigmas).max()))
     axes.set(xlabel="sigmas of the file", xlim=(-reach, reach), ylim=(0.6 - len(rows), 0.6))
     axes.set_yticks(places, [row.label for row in rows])

@@ -62,10 +62,12 @@ PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
-def dispersion_figure(flown: Dispersion, name: str = "overview") -> Figure:
-    """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
+def dispersion_figure(flown: Dispersion, name: str = "overview", *, narrow: bool = False) -> Figure:
+    """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others. ``narrow``:
+    the last one for phones.
+    """
     how = f"{flown.plan.scheme} by {model_name([flown.core.study.model.schedule])}"
-    return _figure(flown.core, flown.verdict, name, how)
+    return _figure(flown.core, flown.verdict, name, how, narrow=narrow)
 
 
 def loop_cases_figure(flown: LoopDispersion) -> Figure:
@@ -76,18 +78,22 @@ def loop_cases_figure(flown: LoopDispersion) -> Figure:
 
 
 @style.styled()
-def _figure(results: Results | LoopResults, judged: Verdict, name: str, how: str) -> Figure:
+def _figure(
+    results: Results | LoopResults, judged: Verdict, name: str, how: str, *, narrow: bool = False
+) -> Figure:
     panels = PANELS[name]
     spacecraft = results.study.model.spacecraft
-    figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
+    width = style.PHONE if narrow else (4.1, 7.4, 10.8)[panels - 1]
+    figure = style.sheet(width, 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
         _cases(axes[:2], results, judged)
     if isinstance(results, Results) and name != "cases":
         _momentum(axes[-1], results)
     style.legend(figure, axes, 2 if name == "momentum" else 8)
-    style.heading(figure, spacecraft, f"{how}, {results.done:,} dispersed cases", stated(judged))
-    return figure
+    return style.finished(
+        figure, spacecraft, f"{how}, {results.done:,} dispersed cases", stated(judged)
+    )
 
 
 def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) -> None:
@@ -222,8 +228,17 @@ def _momentum(axes: Axes, results: Results) -> None:
     )
     dots.should_simplify = False
     # Above the ellipse: where all cases lie on a line, it would hide them.
-    look: dict[str, Any] = {"linewidth": 1.6, "capstyle": "round", "alpha": DENSE, "zorder": 2.5}
-    axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", **look))
+    axes.add_patch(
+        PathPatch(
+            dots,
+            edgecolor=MOTION,
+            facecolor="none",
+            linewidth=1.6,
+            capstyle="round",
+            alpha=DENSE,
+            zorder=2.5,
+        )
+    )
     some = (
         f"{len(few):,} of the {results.done:,} cases"
         if len(few) < results.done
@@ -240,19 +255,11 @@ def _momentum(axes: Axes, results: Results) -> None:
         style.off_scale(axes, f"required ≤ {style.number(limit)}°")
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
-        mark: dict[str, Any] = {
-            "marker": "+",
-            "color": INK,
-            "markersize": 9,
-            "linestyle": "",
-            "zorder": 3,
-        }
-        axes.plot(
-            0.0,
-            0.0,
-            label=centre.removeprefix("the "),
-            **(mark if aim is Part.SHIFT else style.TARGET),
-        )
+        name = centre.removeprefix("the ")
+        if aim is Part.SHIFT:
+            axes.plot(0.0, 0.0, "+", color=INK, markersize=9, zorder=3, label=name)
+        else:
+            axes.plot(0.0, 0.0, label=name, **style.TARGET)
     axes.locator_params(
         nbins=4
     )  # of shifts of thousandths of a degree more labels would run into each other
@@ -297,11 +304,9 @@ def acceptance_figure(
     judged: Verdict, others: Sequence[Verdict], *, narrow: bool = False
 ) -> Figure:
     """The box of `acceptance`, for the report and ``plan --figure box``."""
-    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4)
+    figure = style.sheet(style.PHONE if narrow else 6.2, 4.4 if narrow else 3.6)
     acceptance(figure.subplots(), judged, others)
-    style.heading(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
-    style.settle(figure)
-    return figure
+    return style.finished(figure, judged.spacecraft, "schemes beside their limits", stated(judged))
 
 
 def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> None:
@@ -324,10 +329,13 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
     near = np.clip(1.1 * farthest, SPARE * limits, REACH * limits)
     ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), geometry.LEAST)
     corner = np.where(bounded, limits, 2.0 * ends)
-    look: dict[str, Any] = {**style.LIMIT, "label": None}
-    axes.fill_between([0.0, corner[0]], corner[1], color=GREY, alpha=0.12, linewidth=0.0)
-    axes.plot([corner[0], corner[0], 0.0], [0.0, corner[1], corner[1]], **look)
-    labels: dict[tuple[float, ...], list[str]] = {}
+    axes.fill_between([0.0, corner[0]], corner[1], **style.BAND)
+    axes.plot(
+        [corner[0], corner[0], 0.0],
+        [0.0, corner[1], corner[1]],
+        **{**style.LIMIT, "label": None},
+    )
+    labels: dict[tuple[float, ...], list[tuple[str, str]]] = {}
     for verdict, colour, region in reversed(regions):
         recommended = verdict is judged
         solid = "-" if verdict.met is not False else (0, (4, 1.5))
@@ -345,10 +353,17 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
             mark = "o"
         if beyond.any() or len(region) < 3:
             ground = colour if recommended else "none"
-            look = {"color": colour, "markersize": 7, "markerfacecolor": ground, "clip_on": False}
-            axes.plot(*place, mark, zorder=3, **look)
+            axes.plot(
+                *place,
+                mark,
+                color=colour,
+                markersize=7,
+                markerfacecolor=ground,
+                clip_on=False,
+                zorder=3,
+            )
             spot = tuple((np.round(place / ends * SPOTS) / SPOTS * ends).tolist())
-            labels.setdefault(spot, []).append(name)
+            labels.setdefault(spot, []).append((name, colour))
         else:
             if recommended:
                 axes.fill(*region.T, color=colour, alpha=0.3, linewidth=0.0)
@@ -357,8 +372,10 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
             far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
             written_in = INK if recommended else colour  # on its own fill
             style.add(axes, name, np.minimum(far, 0.97 * ends), written_in, role="vital")
-    for spot, names in labels.items():
-        style.add(axes, "\n".join(reversed(names)), np.array(spot), INK, role="vital")
+    for spot, written_there in labels.items():
+        names, colours = zip(*reversed(written_there), strict=True)
+        colour = INK if len(names) > 1 else colours[0]
+        style.add(axes, "\n".join(names), np.array(spot), colour, role="vital")
     across, along = map(_bound_axis, bounds)
     axes.set(xlim=(0.0, ends[0]), ylim=(0.0, ends[1]), xlabel=across, ylabel=along)
     axes.locator_params(nbins=6)
@@ -433,14 +450,6 @@ def _bound_axis(bound: Bound) -> str:
     return f"{name}, {unit} ({word} {stated_limit(bound).replace(' deg', '°')})"
 
 
-LOOKS = (
-    (MOTION, "o", "-"),
-    (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))),
-    (INK, "s", (0, (5, 1.5))),
-    (GREY, "v", ":"),
-)
-"""Colour, mark and line of the fronts in turn."""
-
 SAME_ENDS = (0.02, 0.002)  # relative differences in end and in cost of points that are drawn as one
 WIDTH = 14.0  # characters of a line above the picture in an inch of it
 
@@ -455,6 +464,7 @@ CHOSEN: dict[str, Any] = {
     "markersize": 11,
     "markerfacecolor": "none",
     "linestyle": "",
+    "clip_on": False,
     "zorder": 4,
 }
 """Look of the mark of the recommended plan."""
@@ -473,15 +483,13 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
     figure = style.sheet(width, 4.8)
     points = [point for _, _, point in numbered(fronts)]
     how = model_name(point.plan.pulses for point in points)
-    style.heading(
-        figure, spacecraft, f"finish time against cost, {', '.join(schemes_of(fronts))} by {how}"
-    )
+    about = f"finish time against cost, {', '.join(schemes_of(fronts))} by {how}"
     reasons = "\n".join(
         fill(text(entry), int(WIDTH * width)) for entry in missing(spacecraft, fronts)
     )
     if not points:
         figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
-        return figure
+        return style.finished(figure, spacecraft, about)
     axes = figure.subplots()
     axes.set_title(reasons, loc="left", **style.NOTE)
     # A firing of no width at t = 0 ends there, which a log axis has no place for.
@@ -513,8 +521,7 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
         style.log_axis(axes.xaxis)
     axes.grid(True, which="both")
     style.legend(figure, [axes], 3)
-    style.settle(figure)
-    return figure
+    return style.finished(figure, spacecraft, about)
 
 
 def over(cost: float, base: float) -> float:
@@ -533,9 +540,7 @@ def _draw_fronts(
         (index, owner, point.plan.pulses.end, over(point.cost, base))
         for index, owner, point in numbered(fronts)
     ]
-    for front, (colour, mark, line) in zip(
-        fronts, LOOKS * math.ceil(len(fronts) / len(LOOKS)), strict=False
-    ):
+    for front, (colour, mark, line) in zip(fronts, itertools.cycle(style.LOOKS), strict=False):
         if not front.points:
             continue
         own = [(index, end, cost) for index, owner, end, cost in points if owner is front]
@@ -547,8 +552,16 @@ def _draw_fronts(
         failing = [fails(point) for point in front.points]
         for end, cost, hollow in zip(ends, costs, failing, strict=True):
             ground = PAPER if hollow else colour
-            look: dict[str, Any] = {"color": colour, "markerfacecolor": ground, "zorder": 3.5}
-            axes.plot(end, cost, mark, markersize=6, clip_on=False, **look)
+            axes.plot(
+                end,
+                cost,
+                mark,
+                color=colour,
+                markerfacecolor=ground,
+                markersize=6,
+                clip_on=False,
+                zorder=3.5,
+            )
         axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
         for index, end, cost in own:
             near = (place for place in shown if math.isclose(end, place[0], rel_tol=SAME_ENDS[0]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
@@ -72,6 +72,9 @@ LIMIT: dict[str, Any] = {
     "zorder": 1.5,
 }
 """Look of a bound of the requirement."""
+
+BAND: dict[str, Any] = {"facecolor": GREY, "alpha": 0.16, "linewidth": 0.0}
+"""Look of what keeps a bound, and of a dead band."""
 
 PAPER = "#fefefe"
 """Ground under a hollow mark; in a page, its background."""
@@ -273,13 +276,13 @@ def log_angles(axes: Axes, low: float, high: float) -> None:
     axes.set_ylim(low, high)
     log_axis(axes.yaxis)
     axes.set_ylabel("θ, ° (log)")
-    axes.grid()
+    axes.grid(visible=True)  # without the word it would turn off one that is there
 
 
 def off_scale(axes: Axes, text: str) -> None:
     """An arrow at the right edge of a panel towards a limit beyond it, with its ``text``."""
-    look: dict[str, Any] = {"ha": "right", "va": "bottom", "color": INK, "fontsize": SMALL}
-    axes.text(0.99, 0.02, f"{text} →", transform=axes.transAxes, **look)
+    place = axes.transAxes
+    axes.text(0.99, 0.02, f"{text} →", transform=place, ha="right", color=INK, fontsize=SMALL)
 
 
 def number(value: float) -> str:
@@ -302,24 +305,34 @@ def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
     )
 
 
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5, 1, 1.5)), (0, (5, 1.5)), ":")
+LOOKS = tuple(
+    (colour, mark, _DASHES[(row + turn) % len(_DASHES)])
+    for turn in range(3)
+    for row, (colour, mark) in enumerate(((MOTION, "o"), (MOMENTUM, "^"), (INK, "s"), (GREY, "v")))
+)
+"""Colour, mark and line of curves of one kind, in turn: those beside each other differ in all."""
+
 LETTERS = 11.0  # bold letters of a heading that fit in an inch
 LONGEST_NAME = 40  # characters of a name that fit above a picture
 
 
-def heading(
+def finished(
     figure: Figure, spacecraft: Spacecraft, text: str, verdict: tuple[str, Light] | None = None
-) -> None:
-    """The lines above a picture, broken by its width: the name of the spacecraft, ``text``, a
-    verdict in colour.
+) -> Figure:
+    """The figure with the lines above it, broken by its width: the name of the spacecraft,
+    ``text``, a verdict in colour; and with all labels in their places.
     """
     whole = f"{short(spacecraft.name)}: {text}"
+    figure.set_label(whole)  # for pages, which break it by their own width, and have the verdict
     colour = INK
     if verdict is not None:
         whole = f"{whole}\n{verdict[0]}"
         colour = LIGHTS[verdict[1]]
     lines = (fill(line, int(LETTERS * figure.get_figwidth())) for line in whole.split("\n"))
     figure.suptitle("\n".join(lines), color=colour)
-    figure.set_label(whole)  # for pages, which break it by their own width
+    settle(figure)
+    return figure
 
 
 def short(name: str) -> str:
@@ -328,7 +341,7 @@ def short(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
 
 
-def legend(figure: Figure, axes: Sequence[Axes], columns: int = 8) -> None:
+def legend(figure: Figure, axes: Iterable[Axes], columns: int = 8) -> None:
     """One legend under all panels, each name once, where no curve can run into it, in as many
     columns as fit.
     """
@@ -387,7 +400,7 @@ def target(axes: Axes, places: Vector, name: str = "target") -> None:
 
 QUADRANTS = [
     (x * away, y * away)
-    for away in (3.5, 7.0, 12.0)
+    for away in (3.5, 7.0, 12.0, 24.0, 36.0)
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))
 ]
 """Offsets from a point to the nearest corner of its label, points."""
@@ -411,9 +424,8 @@ def settle(figure: Figure) -> None:
     """Lay out the panels, and each label where it covers least; take out those for which there is
     no room.
     """
-    for axes in (
-        figure.axes
-    ):  # drawn later outside this style, as many ticks fit between labels of the same size
+    for axes in figure.axes:
+        # Drawn later outside this style, as many ticks fit between labels of the same size.
         axes.tick_params(labelsize=TICK_SIZE)
         # They lie within the panel and its ticks.
         axes.spines[["left", "right", "top"]].set_in_layout(False)
@@ -461,7 +473,7 @@ def _lay(axes: Axes, notes: Sequence[Annotation]) -> bool:
         outside = not (window.contains(*box.min) and window.contains(*box.max))
         crossed = sum(path.intersects_bbox(box, filled=False) for path in curves)
         return (
-            NO_ROOM * (outside + box.count_overlaps(taken))
+            NO_ROOM * (2 * outside + box.count_overlaps(taken))
             + ON_MARK * box.count_overlaps(marks)
             + crossed
         )

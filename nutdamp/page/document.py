@@ -11,26 +11,16 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import BadRequest
-from nutdamp.views.tables import DataTable, Heading, Shared
+from nutdamp.planning.verdict import Line
+from nutdamp.views.tables import DataTable, FittedColumns, Heading, Shared
 from nutdamp.views.text import sentence
-
-if TYPE_CHECKING:
-    from nutdamp.spacecraft.model import Vector
-
-
-class Cell(NamedTuple):
-    """Text of a cell, flush right for a ``number``; ``bar``, %."""
-
-    text: str
-    number: bool
-    bar: float | None = None
 
 
 class Sheet(NamedTuple):
@@ -46,17 +36,6 @@ class Sheet(NamedTuple):
     mark: int | None = None
     folds: bool = False
     bars: tuple[str, ...] = ()
-
-    @property
-    def cells(self) -> tuple[tuple[Cell, ...], ...]:
-        """Rows of cells."""
-        return tuple(
-            tuple(
-                Cell(text, column.number, number_in(text) if column.name in self.bars else None)
-                for column, text in zip(self.columns, row, strict=False)
-            )
-            for row in self.rows
-        )
 
 
 class FactList(NamedTuple):
@@ -80,15 +59,14 @@ class Points(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """An ``<svg>`` element, its title, if any, a caption, a description, and the ``narrow`` drawing
-    for a phone, if any.
+    """A title, if any, a caption, and two ``<svg>`` elements: that for wide screens and paper, and
+    the ``narrow`` one for a phone.
     """
 
-    svg: str
     title: str
     caption: str
-    described: str
-    narrow: str = ""
+    svg: str
+    narrow: str
 
 
 class Listing(NamedTuple):
@@ -110,15 +88,6 @@ class Download(NamedTuple):
         return base64.b64encode(self.text.encode()).decode()
 
 
-class Beside(NamedTuple):
-    """Blocks side by side where there is room; ``still``: shown only where no script moves the view
-    before them.
-    """
-
-    blocks: tuple[Block, ...]
-    still: bool = False
-
-
 class Details(NamedTuple):
     """Blocks behind their title, which a click opens; they are not printed."""
 
@@ -126,115 +95,16 @@ class Details(NamedTuple):
     blocks: tuple[Block, ...]
 
 
-class Circle(NamedTuple):
-    """A circle of ``radius`` rad on the globe; ``kind`` styles it."""
-
-    name: str
-    radius: float
-    kind: str
-
-
-class NamedDirection(NamedTuple):
-    """A direction on the globe, (3,) inertial; ``kind`` styles it, ``watched``: its angle to the
-    spin axis is shown.
-    """
-
-    name: str
-    axis: Vector
-    kind: str
-    circles: tuple[Circle, ...] = ()
-    watched: bool = False
-
-
-EDGES = (350, 150, 1960, 1760)
-"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right,
-bottom.
-"""
-
-
-class Scale(NamedTuple):
-    """A scale with its name and marks: places with the numbers there."""
-
-    name: str
-    marks: tuple[tuple[float, str], ...]
-
-
-class Panel(NamedTuple):
-    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within
-    the frame; ``outlines`` are fixed lines by their kind, as data of SVG paths.
-    """
-
-    part: str
-    title: str
-    described: str
-    x: Scale
-    y: Scale
-    zero: tuple[float, float]
-    frame: tuple[int, int, int, int] = EDGES
-    outlines: tuple[tuple[str, str], ...] = ()
-
-
-class Strip(NamedTuple):
-    """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
-
-    ``cones``: the scale has room for the angles of the cones; ``outside``: a required nutation that
-    lies beyond it. ``bars``: row of the channel, left
-    and width of each firing; ``closed``: left and width of times without firing.
-    """
-
-    times: Scale
-    angles: Scale
-    zero: float
-    required: float | None
-    cones: bool
-    outside: str
-    channels: tuple[str, ...]
-    bars: tuple[tuple[int, float, float], ...]
-    closed: tuple[tuple[float, float], ...]
-
-
-class Workbench(NamedTuple):
-    """Names of each quantity for the script and for people, its bound in words; the pulses by
-    number and channel.
-
-    ``rolling``: the cones roll on each other; ``command``: that which flies the pulses copied to
-    ``file``.
-    """
-
-    rows: tuple[tuple[str, str, str], ...]
-    pulses: tuple[str, ...]
-    rolling: bool
-    file: str
-    command: str
-
-
 class Moving(NamedTuple):
-    """Fixed parts of the moving view of the plan of a ``scheme``, and its moving parts as the JSON
-    ``data``.
-
-    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``:
-    the reason for which there is no ``workbench``; ``command``: that which writes the same rows, if
-    any.
+    """The view of the motion that a script moves: what is ``shown`` of it before, and the rows as
+    the JSON ``data``.
     """
 
-    scheme: str
-    panels: tuple[Panel, ...]
-    strip: Strip
-    speeds: tuple[tuple[float, str], ...]
-    speed: float
-    angles: tuple[str, str]
-    named: tuple[NamedDirection, ...]
-    dated: bool
-    longitude: str
-    steep: bool
-    how: str
-    workbench: Workbench | None
-    absent: str
-    command: tuple[str, ...]
+    shown: dict[str, Any]
     data: str
 
 
-Block = Sheet | FactList | Prose | Points | Picture | Listing | Download | Moving | Beside | Details
+Block = Sheet | FactList | Prose | Points | Picture | Listing | Download | Moving | Details
 
 
 class PageSection(NamedTuple):
@@ -289,24 +159,14 @@ def controlled(**entries: str) -> Control:
 UNCONTROLLED = Control()  # configuration control of a page without any entry
 
 
-class Bar(NamedTuple):
-    """Shares of a limit that the nominal value and that of the cases take, NaN where one is not
-    known; ``inner``: the limit is the least value.
-    """
-
-    nominal: float
-    cases: float
-    met: bool
-    inner: bool
-
-
 @dataclass(frozen=True, slots=True)
 class Page:
     """A whole report: title, first screen with decision and motion, and sections.
 
     ``state``: value of the `Light` of the verdict; ``broken``: limits that the schedule of a file
     breaks. ``source``: the beginning of the hash of the input file. ``bounds`` have a bar in each
-    row; ``pulses``: all, or the first and the last of ``count``.
+    row, from the ``lines`` of the verdict; ``pulses``: all, or the first and the last of
+    ``count``. ``still``: picture where no script moves the view.
     """
 
     title: str
@@ -319,13 +179,14 @@ class Page:
     verdict: str = ""
     broken: tuple[str, ...] = ()
     bounds: Sheet | None = None
-    bars: tuple[Bar, ...] = ()
+    lines: tuple[Line, ...] = ()
     pulses: Sheet | None = None
     count: int = 0
     facts: FactList | None = None
     acceptance: Block | None = None
     warnings: tuple[str, ...] = ()
-    motion: tuple[Block, ...] = ()
+    motion: Moving | None = None
+    still: Picture | None = None
     sections: tuple[PageSection, ...] = ()
 
     @property
@@ -348,10 +209,11 @@ def sheet(table: DataTable, place: str = "page", **look: Any) -> Sheet:
 
 def sheet_of(title: str, table: Table) -> Sheet:
     """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
+    ranks = table.ranks if isinstance(table, FittedColumns) else (0,) * len(table.columns)
     columns = []
-    for column in table.columns:
+    for column, rank in zip(table.columns, ranks, strict=True):
         name, _, unit = plain(column.header).partition("\n")
-        columns.append(Heading(name, unit, column.justify == "right"))
+        columns.append(Heading(name, unit, column.justify == "right", rank))
     first = columns[0]
     named = first._replace(name=first.name or "quantity")
     return Sheet(title, (named, *columns[1:]), _rows(table), bars=(Shared.LINEAR, Shared.CASES))

@@ -21,16 +21,7 @@ from nutdamp.figures import geometry
 from nutdamp.figures.overview import NO_OUTLINES
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
-from nutdamp.page.document import (
-    EDGES,
-    Circle,
-    Moving,
-    NamedDirection,
-    Panel,
-    Scale,
-    Strip,
-    Workbench,
-)
+from nutdamp.page.document import Moving
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.catalogue import SCHEMES
@@ -58,6 +49,10 @@ wheel they measure 90 deg.
 """
 END = 0.03  # radius of the mark of the end of the spin axis over half the side of that panel
 NONE = -(10**8)  # entry of a row for an angle that does not exist
+EDGES = (350, 150, 1960, 1760)
+"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right,
+bottom.
+"""
 QUICK, UNHURRIED, SLOW = (
     4.0,
     15.0,
@@ -65,18 +60,19 @@ QUICK, UNHURRIED, SLOW = (
 )  # seconds that playing takes at the quickest, at first, and at the slowest
 
 
-def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
+def named_directions(spacecraft: Spacecraft) -> list[dict[str, Any]]:
     """Directions of the globe besides the track: the target, the Sun, the cones that the spin axis
-    keeps.
+    keeps; each with its circles, by their radius in rad. The angle of the axis to those ``watched``
+    is shown.
     """
     directions = []
     if spacecraft.goal.axis is not None:
         circles = [
-            Circle(f"H at most {limit_text(bound.limit)} from target", bound.limit, "target")
+            (f"H at most {limit_text(bound.limit)} from target", bound.limit, "target")
             for bound in requirements.required(spacecraft)
             if bound.part is Part.DISTANCE
         ]
-        directions.append(NamedDirection("target", spacecraft.goal.axis, "target", tuple(circles)))
+        directions.append(("target", spacecraft.goal.axis, "target", circles))
     for keep in spacecraft.watched:
         if keep.direction is not None:
             bounds = [
@@ -84,14 +80,23 @@ def named_directions(spacecraft: Spacecraft) -> tuple[NamedDirection, ...]:
                 ("most", keep.most, "keep-in", keep.most < math.pi),
             ]
             circles = [
-                Circle(f"axis at {word} {limit_text(size)} from {keep.name}", size, kind)
+                (f"axis at {word} {limit_text(size)} from {keep.name}", size, kind)
                 for word, size, kind, bounded in bounds
                 if bounded
             ]
-            directions.append(
-                NamedDirection(keep.name, keep.direction, "watched", tuple(circles), watched=True)
-            )
-    return tuple(directions)
+            directions.append((keep.name, keep.direction, "watched", circles))
+    return [
+        {
+            "name": name,
+            "kind": kind,
+            "watched": kind == "watched",
+            "axis": [round(part, 6) for part in axis.tolist()],
+            "circles": [
+                {"name": circle, "radius": radius, "kind": look} for circle, radius, look in circles
+            ],
+        }
+        for name, axis, kind, circles in directions
+    ]
 
 
 def moving_of(
@@ -101,22 +106,34 @@ def moving_of(
     spacecraft. ``outlines``: where H may end and ends in cases, degrees on the axis track.
     """
     spacecraft = plan.spacecraft
-    named = named_directions(plan.spacecraft)
+    named = named_directions(spacecraft)
     # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
     until = math.ceil(1e3 * geometry.shown_until(spacecraft, plan.pulses)) / 1e3
     flown = propagation.flown(spacecraft, plan.pulses, until)
     turns = until / geometry.quickest(flown)
     samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
-    panels, columns, target, rooms = _panels(flown, track, named)
-    end = geometry.sky_paths(flown, track)[0][-1] + END * rooms[1][1] * geometry.circle()
-    lines = {**outlines, "end": end}.items()
-    paths = tuple((kind, _path(placed(outline, *rooms[1]))) for kind, outline in lines)
-    panels = (panels[0], panels[1]._replace(outlines=paths))
+    pole = geometry.pole_path(track)
+    sky, momentum = geometry.sky_paths(flown, track)
+    target = geometry.sky_target(flown, track)
+    # Only if the globe names it and it leaves room for the paths.
+    reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
+    if not (named and np.all(np.hypot(*target.T) <= reach)):
+        target = np.empty((0, 2))
+    pole_room = geometry.room(pole, 0.1, centre=True)
+    sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
+    end = sky[-1] + END * sky_room[1] * geometry.circle()
+    lines = [(kind, placed(line, *sky_room)) for kind, line in {**outlines, "end": end}.items()]
+    x, y, _ = geometry.sky_names(flown)
+    rates = f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s"
     strip, span = strip_of(flown, track, until)
+    numbers, digits = _numbers(flown, track, until)
     texts = {"none": 0}
     firing = []
-    names = _pulse_names(flown)
+    names = [
+        f"{number}: {channel_text(pulse, spacecraft)}"
+        for number, pulse in enumerate(flown.schedule, 1)
+    ]
     for time in track.t.tolist():  # the number of the text that names the firings at each row
         on = (
             name
@@ -124,27 +141,11 @@ def moving_of(
             if begins <= time <= ends
         )
         firing.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
-    largest = math.degrees(float(track.nutation.max()))
-    # Four figures of the largest nutation.
-    cone = (
-        ANGLE_DIGITS
-        if largest < geometry.LEAST
-        else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
-    )
-    clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
-    # The angles of the spin axis, as every table shows them, in units of their last decimal.
-    angles = direction_columns(spacecraft)
-    texts_of_angles = [[angle.shown(axis) for axis in track.axis] for angle in angles]
-    pointing = [
-        [NONE if text == MISSING else round(float(text) * 10**ANGLE_DIGITS) for text in column]
-        for column in texts_of_angles
-    ]
-    columns |= {
-        "t": _whole(track.t, clock),
-        "theta": _whole(np.degrees(track.nutation), cone),
-        "mu": _whole(np.degrees(track.body_cone), cone),
-        "lambda": _whole(np.degrees(track.space_cone), cone),
-        **_numbered("angle", pointing),
+    columns = {
+        **_numbered("pole", placed(pole, *pole_room)),
+        **_numbered("sky", placed(sky, *sky_room)),
+        **_numbered("momentum", placed(momentum, *sky_room)),
+        **numbers,
         "firing": firing,
     }
     if named:
@@ -152,13 +153,15 @@ def moving_of(
             unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
             columns |= _numbered(name, np.rint(SPHERE * unit.T).astype(int).tolist())
     watched = (
-        np.degrees(attitude.angle_between(track.axis, each.axis)) for each in named if each.watched
+        np.degrees(attitude.angle_between(track.axis, np.array(each["axis"])))
+        for each in named
+        if each["watched"]
     )
     columns |= _numbered("aspect", [_whole(angles, ANGLE_DIGITS) for angles in watched])
-    utc = _dates(spacecraft, track, clock)
     absent = absence(spacecraft, flown.schedule)
+    bench = None if absent else workbench(flown, track, (pole_room, sky_room), until, craft)
     data: dict[str, Any] = {
-        "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
+        "digits": digits,
         "until": until,
         "samples": samples,
         "lead": LEAD,
@@ -168,39 +171,66 @@ def moving_of(
         "columns": {name: np.diff(values, prepend=0).tolist() for name, values in columns.items()},
         "none": NONE,
         "firings": [*texts],
-        "utc": utc,
-        "target": target,
-        "named": [
-            {
-                "name": direction.name,
-                "kind": direction.kind,
-                "axis": [round(part, 6) for part in direction.axis.tolist()],
-                "circles": [
-                    {"radius": circle.radius, "kind": circle.kind} for circle in direction.circles
-                ],
-            }
-            for direction in named
-        ],
+        "utc": _dates(spacecraft, track, digits["t"]),
+        "target": [column[0] for column in placed(target, *sky_room) if column] or None,
+        "named": named,
         "look": _look(track, named),
         "dots": turns * COARSE > samples,
-        "bench": None if absent else workbench_data(flown, track, *rooms, until),
+        "bench": bench,
     }
-    return Moving(
-        plan.scheme,
-        panels,
-        strip,
-        *_speeds(until),
-        (angles[0].heading, angles[1].heading),
-        named,
-        utc is not None,
-        "azimuths" if spacecraft.attitude is None else f"{angles[0].heading}s",
-        turns > STEEP,
-        propagation.model_name([flown.schedule]),
-        None if absent else workbench_of(flown, craft),
-        absent,
-        _command(plan, craft, until, samples),
-        json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
-    )
+    speeds, speed = _speeds(until)
+    angles = [angle.heading for angle in direction_columns(spacecraft)]
+    shown = {
+        "scheme": plan.scheme,
+        "panels": (
+            panel("pole", "Pole curve: ω in the body", pole_room, rates),
+            panel("sky", "Axis track, H towards you", sky_room, (x, y), lines),
+        ),
+        "strip": strip,
+        "speeds": speeds,
+        "speed": speed,
+        "angles": angles,
+        "named": named,
+        "dated": data["utc"] is not None,
+        "longitude": "azimuths" if spacecraft.attitude is None else f"{angles[0]}s",
+        "steep": turns > STEEP,
+        "how": propagation.model_name([flown.schedule]),
+        "workbench": bench,
+        "absent": absent,
+        "command": _command(plan, craft, until, samples),
+    }
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+    return Moving(shown, text)
+
+
+def _numbers(
+    flown: Flight, track: Track, until: float
+) -> tuple[dict[str, list[int]], dict[str, int]]:
+    """Time and angles of each row as whole numbers of the last of their decimals, and how many
+    decimals these have.
+    """
+    largest = math.degrees(float(track.nutation.max()))
+    # Four figures of the largest nutation.
+    cone = ANGLE_DIGITS
+    if largest >= geometry.LEAST:
+        cone = max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
+    clock = max(3, math.ceil(-math.log10(until / (len(track.t) - 1))) + 1)
+    # The angles of the spin axis, as every table shows them, in units of their last decimal.
+    pointing = [
+        [
+            NONE if text == MISSING else round(float(text) * 10**ANGLE_DIGITS)
+            for text in map(angle.shown, track.axis)
+        ]
+        for angle in direction_columns(flown.spacecraft)
+    ]
+    numbers = {
+        "t": _whole(track.t, clock),
+        "theta": _whole(np.degrees(track.nutation), cone),
+        "mu": _whole(np.degrees(track.body_cone), cone),
+        "lambda": _whole(np.degrees(track.space_cone), cone),
+        **_numbered("angle", pointing),
+    }
+    return numbers, {"t": clock, "cone": cone, "angle": ANGLE_DIGITS}
 
 
 def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, ...]:
@@ -221,46 +251,6 @@ def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, .
 
 
 Room = tuple[Vector, float]  # middle (2,) and half the side of a square panel
-
-
-def _panels(
-    flown: Flight, track: Track, named: Sequence[NamedDirection]
-) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None, tuple[Room, Room]]:
-    """Pole curve and axis track, the columns of their paths, the place of the target in the latter,
-    and both rooms.
-    """
-    (sky, momentum), target = geometry.sky_paths(flown, track), geometry.sky_target(flown, track)
-    # Only if the globe names it and it leaves room for the paths.
-    reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
-    if not (named and np.all(np.hypot(*target.T) <= reach)):
-        target = np.empty((0, 2))
-    pole = geometry.pole_path(track)
-    rooms = (
-        geometry.room(pole, 0.1, centre=True),
-        geometry.room(np.vstack([sky, momentum, target]), 0.1),
-    )
-    x, y, _ = geometry.sky_names(flown)
-    names = f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s"
-    panels = (
-        panel("pole", "Pole curve: ω in the body", rooms[0], names),
-        panel("sky", "Axis track, H towards you", rooms[1], (x, y)),
-    )
-    columns: dict[str, list[int]] = {}
-    for name, path, room in zip(
-        ("pole", "sky", "momentum"), (pole, sky, momentum), (*rooms, rooms[1]), strict=True
-    ):
-        columns |= _numbered(name, placed(path, *room))
-    return (
-        panels,
-        columns,
-        [column[0] for column in placed(target, *rooms[1]) if column] or None,
-        rooms,
-    )
-
-
-def _path(columns: list[list[int]]) -> str:
-    """A closed line as data of an SVG path."""
-    return "M" + "L".join(f"{x} {y}" for x, y in zip(*columns, strict=True)) + "Z"
 
 
 def _numbered(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
@@ -285,20 +275,13 @@ def _dates(spacecraft: Spacecraft, track: Track, digits: int) -> dict[str, Any] 
     return {"head": dates[0][:common], "tails": [date[common:] for date in dates]}
 
 
-def _pulse_names(flown: Flight) -> tuple[str, ...]:
-    return tuple(
-        f"{number}: {channel_text(pulse, flown.spacecraft)}"
-        for number, pulse in enumerate(flown.schedule, 1)
-    )
-
-
-def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
+def _look(track: Track, named: Sequence[Mapping[str, Any]]) -> list[float]:
     """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a
     little from the side.
     """
     middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
-    if named and float(middle @ named[0].axis) > -0.9:
-        middle = middle + named[0].axis
+    if named and float(middle @ named[0]["axis"]) > -0.9:
+        middle = middle + named[0]["axis"]
     longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
     turned = math.degrees(longitude or 0.0) - 20.0
     shown = math.degrees(latitude)
@@ -336,29 +319,42 @@ def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
     return [np.rint(column).astype(int).tolist() for column in across]
 
 
-def panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, str]) -> Panel:
-    """A panel with ``room``: its middle (2,) and half its side; the ``names`` of its axes have deg
-    as their unit.
+def panel(
+    part: str,
+    title: str,
+    room: Room,
+    names: tuple[str, str],
+    outlines: Sequence[tuple[str, list[list[int]]]] = (),
+) -> dict[str, Any]:
+    """A panel with ``room``, whose ``part`` is its name for the script; the ``names`` of its axes
+    have deg as their unit. ``outlines``: closed lines that stand still, by their kind.
     """
     middle, half = room
+    # The prefix of the unit that keeps numbers short, and the factor by which they grow.
     prefix, factor = _prefix(half)
-    scales = []
     inner = (1.0 - 2.0 * EDGE) * half
+    scales = []
     for which, name in enumerate(names):
-        values = np.array(
-            geometry.ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5)
-        )
+        at = float(middle[which])
+        values = np.array(geometry.ticks(at - inner, at + inner, 5))
         places = placed(np.column_stack([values, values]), middle[[which, which]], half)[which]
-        scales.append(
-            _scale(
-                name.replace(", deg", f", {prefix}deg"),
-                map(float, places),
-                (factor * values).tolist(),
-            )
-        )
-    (across,), (along,) = placed(np.zeros((1, 2)), middle, half)
-    described = f"{title}; {scales[0].name} to the right, {scales[1].name} upwards"
-    return Panel(part, title, described, scales[0], scales[1], (across, along))
+        named = name.replace(", deg", f", {prefix}deg")
+        scales.append(_scale(named, map(float, places), (factor * values).tolist()))
+    x, y = scales
+    paths = [
+        (kind, "L".join(f"{across} {along}" for across, along in zip(*line, strict=True)))
+        for kind, line in outlines
+    ]
+    return {
+        "part": part,
+        "title": title,
+        "described": f"{title}; {x['name']} to the right, {y['name']} upwards",
+        "x": x,
+        "y": y,
+        "zero": [column[0] for column in placed(np.zeros((1, 2)), middle, half)],
+        "frame": EDGES,
+        "outlines": [(kind, f"M{path}Z") for kind, path in paths],
+    }
 
 
 def _prefix(largest: float) -> tuple[str, float]:
@@ -370,26 +366,29 @@ def _prefix(largest: float) -> tuple[str, float]:
     )
 
 
-def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> Scale:
-    return Scale(
-        name,
-        tuple(
-            (at, f"{value:.6g}".replace("-", "−")) for at, value in zip(places, values, strict=True)
-        ),
-    )
+def _scale(name: str, places: Iterable[float], values: Iterable[float]) -> dict[str, Any]:
+    """A scale with its ``name`` and marks: places with the numbers there."""
+    texts = (f"{value:.6g}".replace("-", "−") for value in values)
+    return {"name": name, "marks": list(zip(places, texts, strict=True))}
 
 
-def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
-    """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
+def strip_of(flown: Flight, track: Track, until: float) -> tuple[dict[str, Any], list[float]]:
+    """Angles and firings over time, and the lowest and highest angle of the scale, deg.
+
+    Marks are in per cent, all else in units of the SVG: ``required`` and ``zero``; row of the
+    channel, left and width of the ``bars`` of firings; left and width of the times ``closed`` to
+    them. ``cones``: the scale has room for their angles; ``outside``: a required nutation that lies
+    beyond it.
+    """
     spacecraft = flown.spacecraft
     cones = np.degrees(np.concatenate([track.body_cone, track.space_cone]))
     theta = np.degrees(track.nutation)
     apart = float(np.abs(cones).max()) > APART * max(float(theta.max()), geometry.LEAST)
     angles = np.concatenate([theta, [0.0]] if apart else [theta, cones, [0.0]])
-    low, high = float(angles.min()), float(angles.max())
-    margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
-    low = low - margin
-    high = high + margin
+    size = float(np.ptp(angles))
+    margin = 0.06 * size if size > geometry.LEAST else 1.0
+    low = float(angles.min()) - margin
+    high = float(angles.max()) + margin
     width, height = 2000, 1000  # in units of the SVG
 
     def rise(angle: float) -> float:
@@ -403,28 +402,29 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
 
     required = None if spacecraft.requirement is None else spacecraft.requirement.nutation
     level = math.inf if required is None else math.degrees(required)
-    channels = tuple(geometry.channels_fired(flown))
+    within = low < level < high
+    channels = geometry.channels_fired(flown)
     prefix, factor = _prefix(high - low)
     edge = EDGE * (high - low)
     marked, times = geometry.ticks(low + edge, high - edge, 5), geometry.ticks(0.0, until, 6)
-    strip = Strip(
-        times=_scale("time, s", (100.0 * across(time) for time in times), times),
-        angles=_scale(
+    strip = {
+        "times": _scale("time, s", (100.0 * across(time) for time in times), times),
+        "angles": _scale(
             f"{prefix}deg",
             (rise(angle) * 100.0 / height for angle in marked),
             (factor * angle for angle in marked),
         ),
-        zero=rise(0.0),
-        required=rise(level) if low < level < high else None,
-        cones=not apart,
-        outside="" if required is None or low < level < high else limit_text(math.radians(level)),
-        channels=channels,
-        bars=tuple(
+        "zero": rise(0.0),
+        "required": rise(level) if within else None,
+        "cones": not apart,
+        "outside": "" if required is None or within else limit_text(math.radians(level)),
+        "channels": channels,
+        "bars": [
             (channels.index(pulse.channel), *spread(*span))
             for pulse, span in zip(flown.schedule, flown.spans, strict=True)
-        ),
-        closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(spacecraft, until)),
-    )
+        ],
+        "closed": [spread(begins, ends) for begins, ends in geometry.closed(spacecraft, until)],
+    }
     return strip, [low, high]
 
 
@@ -447,42 +447,41 @@ def absence(spacecraft: Spacecraft, schedule: Schedule) -> str:
 EDITED = "edited.csv"  # file that the command of the workbench flies
 
 
-def workbench_of(flown: Flight, craft: str) -> Workbench:
-    """The workbench of a flight, which must have one by `absence`; ``craft`` as in `moving_of`."""
-    spacecraft = flown.spacecraft
-    limits = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
+def workbench(
+    flown: Flight, track: Track, rooms: tuple[Room, Room], until: float, craft: str
+) -> dict[str, Any]:
+    """The workbench of a flight, which must have one by `absence`; ``craft`` as in `moving_of`.
+
+    Names of each quantity for the script and for people, with its bound in words, and the command
+    that flies the pulses copied to a file. For the script body, pulses, limits and scales, SI and
+    rad in principal axes: ``rooms`` are those of pole curve and axis track, deg/s and deg;
+    ``track`` is shown to ``until`` s.
+    """
+    spacecraft, limits = flown.spacecraft, flown.spacecraft.limits
+    target = spacecraft.goal.axis
+    channels = geometry.channels_fired(flown)
+    bounds = {bound.part: bound.limit for bound in requirements.required(spacecraft)}
     parts = [Part.NUTATION, Part.SHIFT]
-    if spacecraft.goal.axis is not None:
+    if target is not None:
         parts.append(Part.DISTANCE)
     rows = [
         (
             part.value,
             requirements.POINTING if part is Part.DISTANCE else part.label,
-            f"≤ {limit_text(limits[part]).removesuffix(' deg')}°" if part in limits else "",
+            f"≤ {limit_text(bounds[part]).removesuffix(' deg')}°" if part in bounds else "",
         )
         for part in parts
     ]
-    if Part.SPIN in limits:
-        rows.append((Part.SPIN.value, Part.SPIN.label, f"≤ {quantity(limits[Part.SPIN], 'rad/s')}"))
-    command = " ".join(filter(None, ("nutdamp simulate", craft, f"--schedule {EDITED} --flown")))
-    return Workbench(
-        tuple(rows), _pulse_names(flown), spacecraft.inertia.symmetric, EDITED, command
-    )
-
-
-def workbench_data(
-    flown: Flight, track: Track, pole: Room, sky: Room, until: float
-) -> dict[str, Any]:
-    """Data of the script, SI and rad in principal axes: body, pulses, limits, and the scales of the
-    panels.
-
-    ``pole`` and ``sky`` are the rooms of the panels, deg/s and deg; ``track`` is shown to ``until``
-    s.
-    """
-    spacecraft, limits = flown.spacecraft, flown.spacecraft.limits
-    target = spacecraft.goal.axis
-    channels = geometry.channels_fired(flown)
+    if Part.SPIN in bounds:
+        spin = f"≤ {quantity(bounds[Part.SPIN], 'rad/s')}"
+        rows.append((Part.SPIN.value, Part.SPIN.label, spin))
+    command = ("nutdamp simulate", craft, f"--schedule {EDITED} --flown")
+    fired = [(pulse, channel_of(spacecraft, pulse)) for pulse in flown.schedule]
     return {
+        "rows": rows,
+        "rolling": spacecraft.inertia.symmetric,
+        "file": EDITED,
+        "command": " ".join(filter(None, command)),
         "body": {
             "moments": spacecraft.inertia.moments,
             "sense": math.copysign(1.0, spacecraft.spin),
@@ -505,9 +504,7 @@ def workbench_data(
                 if channel is None or math.isinf(channel.max_on_time)
                 else channel.max_on_time,
             }
-            for pulse, channel in (
-                (pulse, channel_of(spacecraft, pulse)) for pulse in flown.schedule
-            )
+            for pulse, channel in fired
         ],
         "limits": {
             "earliest": limits.earliest,
@@ -520,8 +517,8 @@ def workbench_data(
         "spin": spacecraft.goal.spin,
         "frame": EDGES,
         "plane": geometry.sky_plane(flown, track.momentum[0]).tolist(),
-        "pole": [*pole[0].tolist(), pole[1]],
-        "sky": [*sky[0].tolist(), sky[1]],
+        "pole": [*rooms[0][0].tolist(), rooms[0][1]],
+        "sky": [*rooms[1][0].tolist(), rooms[1][1]],
         # Of times changed by hand, s: the decade of a two-thousandth of the time shown.
         "step": 10.0 ** math.floor(math.log10(until / 2000.0)),
     }

@@ -15,7 +15,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -55,7 +55,7 @@ from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import NO_NUTATION, Plan
 from nutdamp.planning.simulation import unrounded
 from nutdamp.planning.tradeoff import Front, Trade
-from nutdamp.planning.verdict import Light, Line, Verdict
+from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import glance, guide
 from nutdamp.views import verdict as verdicts
@@ -107,7 +107,7 @@ def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no
     other script.
     """
-    moves = any(isinstance(block, document.Moving) for block in page.motion)
+    moves = isinstance(page.motion, document.Moving)
     style, script = (
         "\n".join(
             files("nutdamp.page").joinpath(name).read_text("utf-8").strip()
@@ -152,7 +152,7 @@ def _templates() -> Environment:
     environment.filters["css"] = lambda text: re.sub(
         "[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text
     )
-    environment.filters.update(labelled=_labelled, whole=_whole)
+    environment.filters.update(whole=_whole, number=document.number_in)
     return environment
 
 
@@ -169,13 +169,6 @@ def _whole(text: str) -> Markup:
     parts = [escape(part) for part in WHOLE.split(text)]
     parts[1::2] = [f'<span class="whole-word">{part}</span>' for part in parts[1::2]]
     return Markup("".join(parts))
-
-
-def _labelled(svg: str, described: str) -> Markup:
-    """A picture with its description for those who do not see it."""
-    from markupsafe import Markup
-
-    return Markup(svg.replace("<svg ", f'<svg aria-label="{escape(described)}" ', 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,31 +281,22 @@ def report_page(
                 broken=tuple(broken),
                 state=Light.AMBER.value if broken and judged.light is Light.GREEN else page.state,
                 bounds=document.sheet(verdicts.bound_table(judged)),
-                bars=tuple(_bar(line) for line in judged.lines),
+                lines=tuple(judged.lines),
                 pulses=_fired(chosen),
                 count=len(chosen.pulses.blocks) or len(chosen.pulses),
                 facts=document.facts_of("Final state, after the last pulse", glance.ends(chosen)),
                 acceptance=acceptance_picture(compared),
                 warnings=(*warnings, *broken),
-                motion=(
-                    moving_of(
-                        chosen,
-                        repeat.craft(built_in=spacecraft.built_in),
-                        studies.accepted(chosen._flight, judged),
-                    ),
-                    document.Beside((flight_picture(chosen, judged),), still=True),
+                motion=moving_of(
+                    chosen,
+                    repeat.craft(built_in=spacecraft.built_in),
+                    studies.accepted(chosen._flight, judged),
                 ),
+                still=flight_picture(chosen, judged),
             )
         task.reach(1.0)
         sections = _sections(compared, judged, repeat, page, traded, notes[NOTES:])
         return replace(page, sections=tuple(sections))
-
-
-def _bar(line: Line) -> document.Bar:
-    """Bar of a bound."""
-    dispersed = math.nan if line.dispersed is None else float(line.bound.used(line.dispersed))
-    nominal = float(line.bound.used(line.nominal))
-    return document.Bar(nominal, dispersed, line.met, line.bound.inner)
 
 
 SHOWN = 8  # pulses on the first screen; of more the first and the last
@@ -509,8 +493,8 @@ def _versions() -> Iterator[tuple[str, str]]:
 
 PICTURES = {
     "course": (
-        "Axis track: the spin axis in space, with the places of the angular momentum H. Below: "
-        "nutation on a log axis with what is required, and the firings of each channel.",
+        "Axis track: the spin axis in space, with the places of the angular momentum H; "
+        "nutation on a log axis with what is required; the firings of each channel.",
         "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
     ),
     "acceptance": (
@@ -539,20 +523,14 @@ def flight_picture(plan: Plan, judged: Verdict) -> Picture:
     """
     flown, track = overview.shown(plan)
     outlines = studies.accepted(flown, judged)
-    figures = (
-        overview.course_figure(flown, track, judged, outlines, narrow=narrow)
-        for narrow in (False, True)
-    )
-    return _picture("course", *figures)
+    draw = partial(overview.flight_figure, "course", flown, track, judged, outlines=outlines)
+    return _picture("course", draw)
 
 
 def acceptance_picture(compared: Comparison) -> Picture:
     """Schemes beside the limits; raises MissingExtra."""
-    figures = (
-        studies.acceptance_figure(compared.verdict, compared.others, narrow=narrow)
-        for narrow in (False, True)
-    )
-    return _picture("acceptance", *figures)
+    draw = partial(studies.acceptance_figure, compared.verdict, compared.others)
+    return _picture("acceptance", draw)
 
 
 def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
@@ -560,23 +538,22 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     MissingExtra.
     """
     traded = Trade(compared.spacecraft, tuple(fronts), compared.recommended)
-    figures = (studies.trade_figure(traded, narrow=narrow) for narrow in (False, True))
-    return _picture("trade", *figures)
+    return _picture("trade", partial(studies.trade_figure, traded))
 
 
 def dispersion_picture(dispersed: Dispersion) -> Picture:
     """Final directions of H in the cases of a study; raises MissingExtra."""
-    return _picture("momentum", studies.dispersion_figure(dispersed, "momentum"))
+    return _picture("momentum", partial(studies.dispersion_figure, dispersed, "momentum"))
 
 
-def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
+def _picture(name: str, draw: Callable[..., Figure]) -> Picture:
     """A picture with its title as text of the page, and the ``narrow`` drawing for a phone; those
     of the first screen stand beside its headline and have no other.
     """
-    title = str(figure.get_label()) or figure.get_suptitle()
-    title = "" if name in FIRST else title
-    phone = "" if narrow is None else image.svg(narrow, titled=False)
-    return Picture(image.svg(figure, titled=False), title, *PICTURES[name], phone)
+    figures = [draw(narrow=narrow) for narrow in (False, True)]
+    title = "" if name in FIRST else str(figures[0].get_label())
+    caption, described = PICTURES[name]
+    return Picture(title, caption, *(image.svg(figure, described) for figure in figures))
 
 
 EQUATIONS = (

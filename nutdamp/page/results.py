@@ -167,9 +167,9 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
         flight, track = result.shown, result.pictured
     named = units.instance("name", name, str, "the name of a figure")
     try:
-        return overview.flight_figure(named, flight, track, judged, box)
+        return overview.flight_figure(named, flight, track, judged, box=box)
     except KeyError:
-        names = [*overview.DRAWN] if box is None else [*overview.DRAWN, "box"]
+        names = [*overview.FIGURES] if box is None else [*overview.FIGURES, "box"]
         raise BadRequest(
             f"there is no figure {name!r}; expected one of {', '.join(names)}"
         ) from None

@@ -174,18 +174,23 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
     for name, where in shown.items():
         heading = name.replace("_", " ")
         angle = angle_of(f"flown.{name}")
+        order = 0 if name == "nutation" else 2
         if "screen" in where:
             short = shortly(largest[name != "nutation"])
-            order = 0 if name == "nutation" else 2
             residuals.append(Column("", heading, "", angle, short, "screen", rank=order))
         where = f"{where.removeprefix('screen ')} csv"
-        residuals.append(Column(f"{name}_deg", heading, "deg", angle, small_angle, where))
+        residuals.append(
+            Column(f"{name}_deg", heading, "deg", angle, small_angle, where, rank=order)
+        )
     axes, momenta = [], []
     for column in parts.direction_columns(spacecraft):
         name = SHORT_NAMES.get(column.heading, column.heading)
         value = _feasible(partial(_direction, "axis", column))
         where = "full page csv"
-        axes.append(Column(f"axis_{column.key}", f"axis {name}", "deg", value, column.text, where))
+        axis = Column(
+            f"axis_{column.key}", f"axis {name}", "deg", value, column.text, where, rank=3
+        )
+        axes.append(axis)
         value = _feasible(partial(_direction, "momentum", column))
         momenta.append(Column(f"momentum_{column.key}", "", "", value, where="csv"))
     bounds = [
@@ -209,13 +214,14 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
         Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE, rank=3),
         Column("pulses", "", "", lambda plan: len(plan.pulses), where="csv", kind=WHOLE),
         Column("", "end", "s", _feasible("schedule.end"), to_figures(4), "screen", rank=1),
-        Column.named("end_s=schedule.end", "end", "s", "{:.3f}".format, "full page csv"),
+        Column.named("end_s=schedule.end", "end", "s", "{:.3f}".format, "full page csv", rank=1),
         Column.named(
             "total_impulse_Nms=schedule.total_impulse",
             Shared.IMPULSE,
             "N m s",
             _four,
             "full page csv" if fuelled else "full page csv screen",
+            rank=2 if fuelled else 0,
         ),
         Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv"),
         Column.named(
@@ -258,6 +264,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> list[Column]:
             "rad/s",
             _four,
             "full csv page" if any(plan._spin_change for plan in compared.plans) else "full csv",
+            rank=3,
         ),
         Column("delta_v_m_s", "", "", speed, where="csv"),
         *bounds,

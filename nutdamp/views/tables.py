@@ -302,11 +302,14 @@ class Column(NamedTuple):
 
 
 class Heading(NamedTuple):
-    """Heading of a column for people; ``number``: flush right, and sorted by value."""
+    """Heading of a column for people; ``number``: flush right, and sorted by value; ``rank`` as of
+    `Column`.
+    """
 
     name: str
     unit: str = ""
     number: bool = True
+    rank: int = 0
 
 
 @dataclass(frozen=True)
@@ -332,7 +335,7 @@ class DataTable:
     def headings(self, place: str) -> tuple[Heading, ...]:
         """Headings for people."""
         return tuple(
-            Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT)
+            Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT, column.rank)
             for column in self.at(place)
         )
 

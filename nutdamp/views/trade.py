@@ -117,6 +117,7 @@ def _table(rows: Sequence[TradeRow]) -> DataTable:
             "",
             lambda row: row.spent(row.bound),
             where="full" if bounded else "",
+            rank=5,
         ),
         Column("pulses", Shared.PULSES, "", count, where=everywhere, kind=WHOLE, rank=4),
         *file_columns(

@@ -257,7 +257,7 @@ def test_the_title_has_the_verdict_in_its_colour(
     verdict = planning.judge(
         plan, None if share is None else Cases(100, 1, 0.9, share, share, share)
     )
-    figure = overview.course_figure(*overview.shown(plan), verdict)
+    figure = overview.flight_figure("course", *overview.shown(plan), verdict)
     assert to_hex(present(figure._suptitle).get_color()) == colour  # type: ignore[attr-defined]
     assert heading(figure).endswith(statement(verdict))
 
@@ -324,7 +324,7 @@ def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
 def test_of_a_very_long_time_all_pictures_say_how_much_is_drawn() -> None:
     made = propagation.flown(WIDE, Schedule(), 1e6)
     track = made.sampled(1000, 1e6)
-    figure = overview.course_figure(made, track)
+    figure = overview.flight_figure("course", made, track)
     axes = figure.axes[-1]
     until = present(re.search(r"the first ([\d.]+) s of 1e\+06 s", heading(figure)))
     assert float(until[1]) == pytest.approx(axes.get_xlim()[1], rel=1e-3)

@@ -10,6 +10,7 @@ from functools import cache
 from html.parser import HTMLParser
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -41,6 +42,11 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
 # --- a small reader of HTML for tests: balanced tags, attributes, text; no browser
 
 VOID = {"meta", "link", "br", "img", "hr", "input"}
+
+
+def part(page: Any, name: str) -> Any:
+    """A part of the moving view in a browser."""
+    return page.locator(f'.moving [data-part="{name}"]')
 
 
 @dataclass
@@ -198,8 +204,6 @@ def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pu
 
 def figure_of(name: str, flight: Flight, track: Track) -> Figure:
     """One of `NAMES`."""
-    if name == "course":
-        return overview.course_figure(flight, track)
     return overview.flight_figure(name, flight, track)
 
 

@@ -78,3 +78,22 @@ def browse(chromium: Any) -> Callable[..., Any]:
         assert said == []
 
     return opened
+
+
+@pytest.fixture
+def violations() -> Callable[..., list[tuple[str, str]]]:
+    """What an accessibility checker finds on a page, by some ``rules`` alone or all: rule and
+    element.
+    """
+    axe = pytest.importorskip(
+        "axe_playwright_python.sync_playwright",
+        reason="NOT CHECKED for accessibility: axe is not installed: "
+        "pip install 'nutdamp[browser]'",
+    ).Axe()
+
+    def found(page: Any, *rules: str) -> list[tuple[str, str]]:
+        options = {"resultTypes": ["violations"], **({"runOnly": rules} if rules else {})}
+        broken = axe.run(page, options=options).response["violations"]
+        return [(one["id"], node["html"][:200]) for one in broken for node in one["nodes"]]
+
+    return found

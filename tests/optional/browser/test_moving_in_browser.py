@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 from collections.abc import Callable
+from functools import cache
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,9 @@ import pytest
 from support import places
 from support.cases import spread
 from support.process import Run
+from support.shown import part
 
 from nutdamp.files.reader import example_text, read_spacecraft
-from nutdamp.page.document import Page
 from nutdamp.page.moving import LEAD
 from nutdamp.page.report import Repeat, page_html, report_page
 from nutdamp.planning.decision import compare
@@ -34,25 +35,19 @@ Browse = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """The page of a spacecraft file, made once."""
-    folder = tmp_path_factory.mktemp("moving")
-    known: dict[str, Path] = {}
+    folder = tmp_path_factory.mktemp("pages")
 
-    def page(text: str) -> Path:
-        if text not in known:
-            made = report_page(
-                compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", "")
-            )
-            known[text] = folder / f"{len(known)}.html"
-            known[text].write_text(page_html(made), encoding="utf-8")
-        return known[text]
+    @cache
+    def page(text: str, schemes: tuple[str, ...] = CLASSIC, name: str = "a") -> Path:
+        compared = compare(read_spacecraft(text, f"{name}.yaml"), schemes)
+        repeat = Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", text)
+        target = folder / f"{len([*folder.iterdir()])}.html"
+        target.write_text(page_html(report_page(compared, repeat)), encoding="utf-8")
+        return target
 
     return page
-
-
-def part(page: Any, name: str) -> Any:
-    return page.locator(f'.moving [data-part="{name}"]')
 
 
 def text(page: Any, name: str) -> str:
@@ -397,17 +392,6 @@ def test_where_nothing_is_feasible_there_is_no_view(browse: Browse, written: Any
         assert page.locator("h1").is_visible()
 
 
-def test_without_script_and_in_print_the_pictures_remain(browse: Browse, written: Any) -> None:
-    with browse(written(EXAMPLE), java_script_enabled=False) as page:
-        assert not page.locator(".moving").is_visible()
-        assert page.locator("figure svg").first.is_visible()
-    with browse(written(EXAMPLE)) as page:
-        assert page.locator(".moving").is_visible()
-        page.emulate_media(media="print")
-        assert not page.locator(".moving").is_visible()
-        assert page.locator("figure svg").first.is_visible()
-
-
 @spread("width", [360, 400], quick=1)
 def test_on_a_phone_the_buttons_stand_in_one_line(browse: Browse, written: Any, width: int) -> None:
     with browse(written(EXAMPLE), width) as page:
@@ -475,30 +459,16 @@ BEYOND = """(selector) => [...document.querySelectorAll(selector)]
 """``tab(name, width=1400, scheme="light")``: a page of a configuration in a new tab."""
 
 
-def made(name: str) -> Page:
-    """The page of a configuration."""
-    source = next(
-        (path.read_text(encoding="utf-8") for path in CONFIG_FILES if path.stem == name),
-        example_text(),
-    )
-    source = {LONG: source.replace("max_on_time: 2 s", "max_on_time: 0.14 s"), UNPLANNED: BARE}.get(
-        name, source
-    )
-    schemes = {LONG: ("four-pulse",), UNPLANNED: ("four-pulse",)}.get(name, ())
-    compared = compare(read_spacecraft(source, f"{name}.yaml"), schemes)
-    return report_page(compared, Repeat(f"nutdamp report {name}.yaml", f"{name}.yaml", source))
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The file of a configuration's page, made once."""
-    folder = tmp_path_factory.mktemp("pages")
+@pytest.fixture
+def pages(written: Callable[..., Path]) -> Callable[[str], Path]:
+    """The file of a configuration's page."""
 
     def page(name: str) -> Path:
-        target = folder / f"{name}.html"
-        if not target.exists():
-            target.write_text(page_html(made(name)), encoding="utf-8")
-        return target
+        long = EXAMPLE.replace("max_on_time: 2 s", "max_on_time: 0.14 s")
+        if name in (LONG, UNPLANNED):
+            return written(long if name == LONG else BARE, ("four-pulse",), name)
+        files = {path.stem: path.read_text(encoding="utf-8") for path in CONFIG_FILES}
+        return written(files.get(name, EXAMPLE), (), name)
 
     return page
 
@@ -582,34 +552,19 @@ def test_the_sheet_has_a_row_for_each_of_twenty_pulses(tab: Browse) -> None:
 
 
 @pytest.mark.parametrize("name", everywhere())
-def test_an_accessibility_checker_finds_nothing(tab: Browse, name: str) -> None:
-    axe = pytest.importorskip(
-        "axe_playwright_python.sync_playwright",
-        reason=(
-            "NOT CHECKED for accessibility: axe is not installed: pip install 'nutdamp[browser]'"
-        ),
-    ).Axe()
-
-    def found(page: Any, *rules: str) -> list[tuple[str, str]]:
-        response = axe.run(
-            page, options={"resultTypes": ["violations"], **({"runOnly": rules} if rules else {})}
-        ).response
-        return [
-            (one["id"], node["html"][:200])
-            for one in response["violations"]
-            for node in one["nodes"]
-        ]
-
+def test_an_accessibility_checker_finds_nothing(
+    tab: Browse, violations: Callable[..., Any], name: str
+) -> None:
     for width in (1280, 400):
         with tab(name, width) as page:
             page.evaluate(
                 "document.querySelectorAll('details').forEach((one) => { one.open = true; })"
             )
-            assert found(page) == []
+            assert violations(page) == []
             page.emulate_media(color_scheme="dark")
-            assert found(page, "color-contrast") == []
+            assert violations(page, "color-contrast") == []
             page.evaluate("document.querySelector('html').removeAttribute('lang')")
-            assert [rule for rule, _ in found(page, "html-has-lang")] == [
+            assert [rule for rule, _ in violations(page, "html-has-lang")] == [
                 "html-has-lang"
             ]  # it does look
 
@@ -622,12 +577,13 @@ def test_no_stop_of_the_keyboard_does_nothing(tab: Browse) -> None:
     with tab(BUILT_IN, 1280) as page:
         assert set(page.evaluate(stops)) == {"SUMMARY"}
     with tab(BUILT_IN, 400) as page:
+        page.locator("#background summary", has_text="Pulses").click()  # a table with all values
         page.wait_for_function("document.querySelectorAll('.wide[tabindex]').length > 0")
         assert page.evaluate(
             "[...document.querySelectorAll('.wide[tabindex]')]"
             ".every((one) => one.scrollWidth > one.clientWidth)"
         )
-        box = page.locator("#schemes .wide").first
+        box = page.locator("#background .wide[tabindex]").first
         assert box.get_attribute("aria-label")
         box.focus()
         for _ in range(5):
@@ -644,7 +600,7 @@ def test_without_a_script_and_on_paper_there_is_a_still_picture(tab: Browse, nam
         "[...document.querySelectorAll('.still svg')].filter((one) => one.checkVisibility()).length"
     )
     with tab(name, 1280, "light", java_script_enabled=False) as page:
-        assert page.locator(".still svg").first.is_visible()
+        assert page.evaluate(shown) == 1
         assert not page.locator(".moving").first.is_visible()
     with tab(name, 1280) as page:
         assert page.evaluate(shown) == 0

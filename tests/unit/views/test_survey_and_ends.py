@@ -526,7 +526,9 @@ def test_a_steering_angle_is_the_same_everywhere() -> None:
     body = spinner(steerable=Steerable(5.0))
     pulse = steered(0.75, math.radians(-70.123))
     assert channel_text(pulse, body) == "steerable 289.88°"
-    figure = overview.course_figure(*overview.shown(planning.Plan(body, "x", Schedule((pulse,)))))
+    figure = overview.flight_figure(
+        "course", *overview.shown(planning.Plan(body, "x", Schedule((pulse,))))
+    )
     assert any("289.88°" in text.get_text() for text in figure.axes[2].texts)
 
 
