@@ -314,7 +314,7 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     estimates = dict(zip(carried.names, carried.values.tolist(), strict=True))
     drawn_alone = tree.get("dispersions", "inertia_tensor") is not None
     for key in () if drawn_alone else ("A", "C"):
-        if sigmas[key] > 0.0:
+        if sigmas.get(key, 0.0) > 0.0:
             yield Edit(
                 ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / estimates[key]:.6g} %}}"
             )
