@@ -476,74 +476,7 @@ def fly_pulses(
 def _fly_block(
     bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
 ) -> None:
-    """Fly one block, in place."""
-    edges = pulses.edges
-    if not len(edges):
-        return
-    usual = np.argsort(edges.mean(axis=1), kind="stable")
-    sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
-    if sorted_alike.all():
-        _fly_alike(bodies, rates, quaternion, pulses, watch, usual)
-        return
-    for cases, alike in (
-        (np.flatnonzero(sorted_alike), True),
-        (np.flatnonzero(~sorted_alike), False),
-    ):
-        if len(cases):
-            flown, turned = rates[:, cases], quaternion[:, cases]
-            chosen = (
-                bodies.some(cases),
-                flown,
-                turned,
-                pulses.some(cases),
-                watch and watch.some(cases),
-            )
-            if alike:
-                _fly_alike(*chosen, usual)
-            else:
-                _fly_each(*chosen)
-            rates[:, cases], quaternion[:, cases] = flown, turned
-
-
-def _fly_alike(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    pulses: Pulses,
-    watch: Observer | None,
-    order: NDArray[np.intp],
-) -> None:
-    """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
-    edges, slopes = pulses.edges, pulses.slopes
-    firsts, _ = pulses.torques
-    half = None if pulses.sheds is None else 0.5 * pulses.sheds
-    now = np.zeros(rates.shape[1])
-    on = set[int]()
-    for edge in order.tolist():
-        torque = slope = None
-        if on:
-            acting = sorted(on)
-            torque = np.sum(firsts[acting], axis=0)
-            if slopes is not None:
-                slope = np.sum(slopes[acting], axis=0)
-                torque += sum(slopes[number] * (now - edges[2 * number]) for number in acting)
-        _advance(
-            MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch
-        )
-        now = edges[edge]
-        number, ends = divmod(edge, 2)
-        bodies = bodies.lighter(None if half is None else half[number])
-        ideal = pulses.on_times[number] == 0.0
-        if not ideal.all():
-            (on.remove if ends else on.add)(number)
-        if not ends and ideal.any():
-            rates += np.where(ideal, pulses.impulses[number] / bodies.moments, 0.0)
-
-
-def _fly_each(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
-) -> None:
-    """Fly cases with different orders of edges, in place.
+    """Fly one block, in place, from edge to edge of the pulses of each case.
 
     Those that coast from one edge to the next go on in closed form: with times widely dispersed one
     coast may be long where another case has a pulse on, whose steps it would take.
@@ -557,20 +490,20 @@ def _fly_each(
     torque = np.zeros_like(rates)
     slope = None
     for number, edge_of_each in enumerate(order):
-        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
         edge = _of_each(edges, edge_of_each)
         coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
-        groups = (
-            (np.flatnonzero(coasts), np.flatnonzero(~coasts))
-            if bodies.free
-            else (np.arange(len(now)),)
-        )
-        for cases in filter(len, groups):
-            part = here.some(cases)
-            if bodies.free and coasts[cases[0]]:
-                part = part._replace(torque=None, slope=None)
-            _advance(part, (edge - now)[cases], watch and watch.some(cases))
-            rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
+        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
+        if coasts.all():
+            _advance(here._replace(torque=None, slope=None), edge - now, watch)
+        elif not (bodies.free and coasts.any()):
+            _advance(here, edge - now, watch)
+        else:
+            for cases, coasting in ((coasts, True), (~coasts, False)):
+                part = here.some(np.flatnonzero(cases))
+                if coasting:
+                    part = part._replace(torque=None, slope=None)
+                _advance(part, (edge - now)[cases], watch and watch.some(np.flatnonzero(cases)))
+                rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
         if slope is not None:
             torque = torque + slope * (edge - now)
         pulse, ends = np.divmod(edge_of_each, 2)
@@ -588,6 +521,8 @@ def _fly_each(
 
 def _of_each(values: Any, rows: NDArray[np.intp]) -> Any:
     """Values (m, …, n) of one row of each case, (…, n)."""
+    if (rows == rows[0]).all():
+        return values[rows[0]]
     index = rows.reshape(1, *(1,) * (values.ndim - 2), len(rows))
     return np.take_along_axis(values, index, axis=0)[0]
 
