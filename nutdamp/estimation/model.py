@@ -34,10 +34,9 @@ from nutdamp.estimation.parameters import (
     tilted,
     turned,
 )
-from nutdamp.flight.dynamics import Arc, Dynamics, FreeCoast, Path, Push, make_dynamics
+from nutdamp.flight.dynamics import Arc, FreeCoast, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, triaxial
-from nutdamp.physics.series import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.model import (
     Attitude,
@@ -51,7 +50,6 @@ from nutdamp.spacecraft.schedule import Schedule
 PREDICTION = 0.1  # units of `work` of a prediction, besides steps
 SHOWN = 2e-4  # of each of its samples
 SAMPLE = 1e-3  # of each time of a motion that is new
-POLHODE = 0.8  # units of a coast of three moments between pulses
 OF_SENSORS = (
     "bias",
     "misalignment",
@@ -317,7 +315,7 @@ class Model:
             ),
         )
         acting = make_dynamics(spacecraft)
-        dynamics = _Closed(inertia.moments, acting.constant, acting.forcing._replace(growth=growth))
+        dynamics = replace(acting, forcing=acting.forcing._replace(growth=growth))
         pulses = tuple(
             replace(
                 pulse,
@@ -340,27 +338,6 @@ def _coast(body: Body) -> Path:
     if inertia.symmetric:
         return Arc(inertia.A, inertia.C, 0.0, state, growth, inertia.wheel, body.sense)
     return FreeCoast(inertia.moments, 0.0, state)
-
-
-class _Closed(Dynamics):
-    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on
-    them.
-    """
-
-    def _path(
-        self, state: SpinState, start: float, end: float, push: Push, most: int
-    ) -> tuple[Path, SpinState]:
-        acts = (
-            bool(push.torques)
-            or push.falling is not None
-            or self.constant.any()
-            or self.forcing != Forcing()
-        )
-        if acts or end == start or self.moments[0] == self.moments[1]:
-            return super()._path(state, start, end, push, most)
-        work.spend(POLHODE)
-        coast = FreeCoast(self.moments, start, state)
-        return coast, _state(coast, end)
 
 
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
