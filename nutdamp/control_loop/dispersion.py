@@ -27,7 +27,7 @@ from nutdamp.control_loop.simulation import (
     fly_alone,
     until_default,
 )
-from nutdamp.control_loop.stability import Band, dead_band, expect_in_time
+from nutdamp.control_loop.stability import Band, dead_band, expect_in_time, held_by
 from nutdamp.errors import BadRequest
 from nutdamp.montecarlo.cases import DispersedModel, cold_of, rotated, tank_of, triple
 from nutdamp.montecarlo.inputs import (
@@ -47,7 +47,7 @@ from nutdamp.planning.verdict import Verdict, cases_of, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
-from nutdamp.spacecraft.requirements import Bound, Left, Part
+from nutdamp.spacecraft.requirements import Bound, Held, Left, Part
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import expect_dispersions
 
@@ -295,6 +295,10 @@ class LoopStudy(DrawnCases):
         """Nutation that the loop is designed to leave."""
         return dead_band(self.spacecraft, self.law.loop)
 
+    def held_by(self, bound: Bound) -> Bound:
+        """A bound as the loop holds it."""
+        return held_by(self.law.loop, self.band, bound)
+
     def case(self, number: int) -> Case:
         """Case of a number."""
         return self.model.loops(self.draws_of(number), np.array([number]), self.seed)[0]
@@ -420,6 +424,7 @@ class LoopResults(Counted):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.bounds = tuple(map(self.study.held_by, self.bounds))
         self.values = np.empty((len(OUTPUTS), self.requested))
         self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
         self.lost, self.spin = np.zeros(0, dtype=bool), np.empty(self.requested)
@@ -529,9 +534,11 @@ class LoopDispersion(Dispersed):
             nutation, aim, spin, None if residuals.angles is None else residuals.angles[:, :, 0]
         )
         lost = math.isinf(severity[0])
-        return judge_loop(
-            spacecraft, requirements.held(spacecraft, alone), cases, self.core, lost=lost
-        )
+        held = [
+            Held(study.held_by(line.bound), line.left)
+            for line in requirements.held(spacecraft, alone)
+        ]
+        return judge_loop(spacecraft, held, cases, self.core, lost=lost)
 
 
 def run(

@@ -16,7 +16,14 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.control_loop.controller import Case
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
-from nutdamp.control_loop.stability import Band, Margin, dead_band, expect_in_time, margins
+from nutdamp.control_loop.stability import (
+    Band,
+    Margin,
+    dead_band,
+    expect_in_time,
+    held_by,
+    margins,
+)
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight.cones import Aspect, aspects
 from nutdamp.flight.dynamics import Dynamics, Path, Push
@@ -29,7 +36,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import LOOP, Verdict, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
-from nutdamp.spacecraft.requirements import Held, Left, Part
+from nutdamp.spacecraft.requirements import Held, Left
 from nutdamp.spacecraft.schedule import Pulse
 
 if TYPE_CHECKING:
@@ -155,13 +162,6 @@ def verify_loop(
     return LoopVerification(run, other, "", model.evaluations, pairs)
 
 
-HELD = 1.05
-"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows
-while the loop waits for the phase of its firing, by a twentieth where a time constant is ten
-nutation periods (upper-stage: 0.1 %).
-"""
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
     """Pulses fired by a loop in a ``flown_run``, with its flight; ``known`` is the spacecraft as
@@ -211,13 +211,9 @@ class LoopPlan(Plan):
         """Residual beside each bound; without a requirement the nutation is judged by the
         thresholds of the loop.
         """
-        limit = max(self.band.most, HELD * self.flown_run.loop.start + self.band.noise)
-        lines = super()._held
+        loop = self.flown_run.loop
         return tuple(
-            line
-            if line.bound.required or line.bound.part is not Part.NUTATION
-            else Held(line.bound._replace(limit=limit), line.left)
-            for line in lines
+            Held(held_by(loop, self.band, line.bound), line.left) for line in super()._held
         )
 
     @property

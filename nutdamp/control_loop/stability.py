@@ -25,6 +25,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.constraints import effective_on_time, shortest_on_time
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Bound, Part
 
 NEVER = 1e3  # growth e^{κT} from which on further growth does not matter
 
@@ -167,6 +168,24 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
         float(law.nutation(size, spin)) for size in (left_over * grown, noise, max(steps), tilt)
     ]
     return Band(*angles)
+
+
+HELD = 1.05
+"""Nutation, over the start threshold, that a loop may let stand without a requirement: it grows
+while the loop waits for the phase of its firing, by a twentieth where a time constant is ten
+nutation periods (upper-stage: 0.1 %).
+"""
+
+
+def held_by(loop: Loop, band: Band, bound: Bound) -> Bound:
+    """The bound itself; one of the nutation that nobody requires is by thresholds and dead band,
+    rounded up to two digits of a degree.
+    """
+    if bound.required or bound.part is not Part.NUTATION:
+        return bound
+    limit = math.degrees(max(band.most, HELD * loop.start + band.noise))
+    unit = 10.0 ** (math.floor(math.log10(limit)) - 1)
+    return bound._replace(limit=math.radians(math.ceil(limit / unit) * unit), by_loop=True)
 
 
 FORGOTTEN = 12.0  # time constants of the low-pass filter after which a sample counts no more

@@ -26,13 +26,13 @@ from nutdamp.estimation.parameters import (
     CROSSING,
     GYROS,
     KIND,
-    RATIO,
     SPACE,
     SUN_PULSE,
     TURN,
     Matrix,
     Record,
     Vector,
+    in_moments,
     quantisation,
 )
 from nutdamp.estimation.search import (
@@ -350,9 +350,8 @@ def _rate(fitted: Fit, signal: int) -> float:
     model, named = fitted.model, fitted.named
     if KIND[model.signals[signal]].nutation != SPACE:
         return initial_guess.nutation_rate(model, fitted.values)
-    axial = initial_guess.axial_rate(
-        model, named[RATIO], named.get("omega_3", model.spacecraft.spin)
-    )
+    A, C = in_moments(model.spacecraft, named)
+    axial = initial_guess.axial_rate(model, C / A, named.get("omega_3", model.spacecraft.spin))
     return math.hypot(axial, named["omega_1"], named["omega_2"])
 
 
@@ -433,7 +432,7 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     model = Model(spacecraft, record, growing=spacecraft.inertia.symmetric)
     expect_enough(model)
     if constant := expect_alive(model):
-        return _steady(Model(spacecraft, record, growing=False), constant)
+        return _steady(Model(spacecraft, record, steady=True), constant)
     fitted = _settled(model, _best(model))
     if not _sees_nutation(fitted):
         return _without_nutation(fitted)
@@ -473,13 +472,10 @@ def _steady(model: Model, constant: tuple[str, ...]) -> Fit:
     noise = np.maximum(noise_floor(model), ROUNDING * usual(model.spacecraft, "rad/s"))
     slopes = jacobian(model, values, range(len(values)))
     used = np.ones(len(model.measured), dtype=bool)
-    scaled = slopes / noise[model.signal, None]
-    told = np.concatenate([scaled, model.prior[0]]).any(axis=0)
-    covariance = np.where(np.outer(told, told), covariance_of(model, scaled), 0.0)
     return Fit(
         model,
         values,
-        covariance,
+        covariance_of(model, slopes / noise[model.signal, None]),
         noise,
         used,
         residuals(model, values),
@@ -613,22 +609,11 @@ def _sees_nutation(fitted: Fit) -> bool:
 
 
 def _without_nutation(fitted: Fit) -> Fit:
-    """The fit of a steady spin: spin and axis; C/A and dissipation, which it does not show, are
-    those of the file.
+    """The fit of a steady spin: spin and axis; moments and dissipation, which it does not show,
+    are those of the file.
     """
-    model = Model(fitted.model.spacecraft, fitted.model.record, growing=False, steady=True)
-    values = _begun(fitted, model)
-    ratio = _places(model, (RATIO,))
-    values[ratio] = [model.parameters[at].file for at in ratio]
-    steady = _settled(model, values)
-    # With a tolerance of A the prior of both lets it move a little, which no motion shows.
-    estimate, covariance = steady.values.copy(), steady.covariance.copy()
-    estimate[ratio] = values[ratio]
-    covariance[ratio] = covariance[:, ratio] = 0.0
-    told = next(each.prior for each in fitted.model.parameters if each.name == RATIO)
-    # Without a tolerance in the file C/A is as exact as there.
-    covariance[ratio, ratio] = told**2 if math.isfinite(told) else 0.0
-    return replace(steady, values=estimate, covariance=covariance, steady=True)
+    model = Model(fitted.model.spacecraft, fitted.model.record, steady=True)
+    return replace(_settled(model, _begun(fitted, model)), steady=True)
 
 
 def _best(model: Model) -> Vector:

@@ -35,6 +35,7 @@ from nutdamp.estimation.parameters import (
     Record,
     Values,
     Vector,
+    in_moments,
     wrapped,
 )
 from nutdamp.estimation.search import Fit, named_of, scales_of
@@ -484,7 +485,8 @@ def nutation_rate(model: Model, values: Vector) -> float:
     """
     named = named_of(model, values)
     spin = named.get("omega_3", model.spacecraft.spin)
-    axial = axial_rate(model, named[RATIO], spin)
+    A, C = in_moments(model.spacecraft, named)
+    axial = axial_rate(model, C / A, spin)
     return spin - axial if any(KIND[name].nutation == BODY for name in model.signals) else axial
 
 

@@ -22,7 +22,6 @@ from nutdamp.estimation.parameters import (
     CROSSING,
     DIRECTION,
     KIND,
-    RATIO,
     SUN_ASPECT,
     Parameter,
     Record,
@@ -35,10 +34,9 @@ from nutdamp.estimation.parameters import (
     tilted,
     turned,
 )
-from nutdamp.flight.dynamics import Arc, Dynamics, FreeCoast, Path, Push, make_dynamics
+from nutdamp.flight.dynamics import Arc, FreeCoast, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, triaxial
-from nutdamp.physics.series import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.model import (
     Attitude,
@@ -49,11 +47,9 @@ from nutdamp.spacecraft.model import (
 )
 from nutdamp.spacecraft.schedule import Schedule
 
-HELD = 1e-6  # part of C/A within which a steady spin leaves it
 PREDICTION = 0.1  # units of `work` of a prediction, besides steps
 SHOWN = 2e-4  # of each of its samples
 SAMPLE = 1e-3  # of each time of a motion that is new
-POLHODE = 0.8  # units of a coast of three moments between pulses
 OF_SENSORS = (
     "bias",
     "misalignment",
@@ -100,22 +96,25 @@ class Model:
         steady: bool = False,
     ) -> None:
         """``unequal``: with I1 ≠ I2, as the file has it where that is not said; ``growing``: κ is
-        estimated; ``steady``: no nutation shows C/A, which stays at the file's.
+        estimated; ``steady``: no nutation shows the moments, which stay as the file has them.
         """
         _expect_described(spacecraft, record)
         self.spacecraft, self.record = spacecraft, record
         self.unequal = not spacecraft.inertia.symmetric if unequal is None else unequal
+        first, second, _ = spacecraft.inertia.moments
+        self._uneven = (first - second) / (first + second)
         self.start = record.start
         self._at: dict[tuple[float, ...], tuple[Body, SpinState]] = {}
         self._last: tuple[tuple[tuple[str, float], ...], tuple[Vector, Vector]] | None = None
         self.parameters = tuple(
-            parameters(spacecraft, record, unequal=self.unequal, growing=growing)
-        )
-        if steady:
-            self.parameters = tuple(
-                each._replace(prior=HELD * each.file) if each.name == RATIO else each
-                for each in self.parameters
+            parameters(
+                spacecraft,
+                record,
+                unequal=self.unequal and not steady,
+                growing=growing and not steady,
+                steady=steady,
             )
+        )
         self.prior = prior(spacecraft, self.parameters)
         self.pulses = self._pulses()
         kinds = record.kinds
@@ -172,7 +171,7 @@ class Model:
             [values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])]
         )
         quaternion = self.turned(values)
-        e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
+        e1, e2 = values.get("unequal_1", self._uneven), values.get("unequal_2", 0.0)
         size = math.hypot(e1, e2)
         if not (A > 0.0 and C > 0.0 and size < 1.0):
             raise Infeasible("no body has such moments of inertia")
@@ -224,7 +223,9 @@ class Model:
         """Samples of `measured` as they would be without noise, (m,)."""
         work.spend(PREDICTION + SHOWN * len(self.measured))
         rates, quaternion = self._remembered(values)
-        (A, C), e1, parts = in_moments(self.spacecraft, values), values.get("unequal_1", 0.0), []
+        A, C = in_moments(self.spacecraft, values)
+        e1 = values.get("unequal_1", self._uneven)
+        parts = []
         moments = A * (1.0 + e1), A * (1.0 - e1), C
         for name, samples, rows in zip(self.signals, self.samples, self._rows, strict=True):
             seen = Sighting(
@@ -314,7 +315,7 @@ class Model:
             ),
         )
         acting = make_dynamics(spacecraft)
-        dynamics = _Closed(inertia.moments, acting.constant, acting.forcing._replace(growth=growth))
+        dynamics = replace(acting, forcing=acting.forcing._replace(growth=growth))
         pulses = tuple(
             replace(
                 pulse,
@@ -337,27 +338,6 @@ def _coast(body: Body) -> Path:
     if inertia.symmetric:
         return Arc(inertia.A, inertia.C, 0.0, state, growth, inertia.wheel, body.sense)
     return FreeCoast(inertia.moments, 0.0, state)
-
-
-class _Closed(Dynamics):
-    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on
-    them.
-    """
-
-    def _path(
-        self, state: SpinState, start: float, end: float, push: Push, most: int
-    ) -> tuple[Path, SpinState]:
-        acts = (
-            bool(push.torques)
-            or push.falling is not None
-            or self.constant.any()
-            or self.forcing != Forcing()
-        )
-        if acts or end == start or self.moments[0] == self.moments[1]:
-            return super()._path(state, start, end, push, most)
-        work.spend(POLHODE)
-        coast = FreeCoast(self.moments, start, state)
-        return coast, _state(coast, end)
 
 
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:

@@ -280,11 +280,13 @@ def _off(measured: Vector, predicted: Vector) -> Vector:
     """Components (2n,) of unit vectors across measured ones, (n, 3) each; of opposite ones they add
     up to 2.
     """
-    first = np.cross(measured, np.eye(3)[np.argmin(np.abs(measured), axis=1)])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    off = np.array(
-        [np.sum(across * predicted, axis=1) for across in (first, np.cross(measured, first))]
-    )
+    # The axes across turn with the sample from those across a pole, which stands far from the
+    # opposite of every sample: chosen sample by sample noise would choose, and bias what it shows.
+    poles = np.concatenate([np.eye(3), -np.eye(3)])
+    pole = poles[np.argmax((measured @ poles.T).min(axis=0))]
+    middle = measured + pole
+    share = np.sum(predicted * middle, axis=1) / np.maximum(middle @ pole, TINY)
+    off = (predicted - share[:, None] * measured)[:, pole == 0.0].T
     # Beyond 90 deg what is across falls again, and would be nothing for the opposite direction.
     sizes = np.hypot(*off)
     behind = np.sum(measured * predicted, axis=1) < 0.0
@@ -413,12 +415,13 @@ def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
 def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[float, float]:
     """A and C (kg m²) of the ``values`` of parameters."""
     (A, of_A), (C, of_C), _ = _of_moments(spacecraft)
+    ratio = values.get(RATIO, C / A)
     # Of a body with a wheel it is A that C/A changes where neither has a tolerance: despun, C does
     # not matter.
     if of_C == 0.0 and (of_A > 0.0 or spacecraft.inertia.wheel != 0.0):
-        return C / values[RATIO], C
+        return C / ratio, C
     A = values.get("A", A)
-    return A, values[RATIO] * A
+    return A, ratio * A
 
 
 def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, Vector]:
@@ -464,15 +467,16 @@ def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[floa
 
 
 def parameters(
-    spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool
+    spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool, steady: bool
 ) -> Iterator[Parameter]:
     """The parameters of a record, motion at its start first; ``unequal``: I1 ≠ I2, ``growing``:
-    with dissipation.
+    with dissipation, ``steady``: without the moments, which only a nutation shows.
     """
     dispersions = spacecraft.dispersions or EXACT
     spin = float(spacecraft.omega0[2])
     step = TINY * spacecraft.fastest
-    yield from moments(spacecraft)
+    if not steady:
+        yield from moments(spacecraft)
     if dispersions.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
         wheel, sigma = prior_of(dispersions.wheel_momentum, spacecraft.inertia.wheel)
         yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))

@@ -48,11 +48,8 @@ WHEEL = "wheel momentum"  # input of a wheel that is estimated
 
 DEG = math.pi / 180.0
 
-UNTOLD, SHARED, TOLD = (
-    "file",
-    "both",
-    "data",
-)  # sources of an estimate: the file's tolerances, both, or the data
+# sources of an estimate: the file's tolerances, both, the data, or the ratio that these tell
+UNTOLD, SHARED, TOLD, BY_RATIO = "file", "both", "data", "ratio"
 
 FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell a value
 CORRELATED = 1e-3  # correlations below are left out of files
@@ -78,10 +75,13 @@ class Estimate(NamedTuple):
     sigma: float
     file: float | None
     prior: float | None
+    by_ratio: bool = False  # of C/A by the other moment, which the file has without a tolerance
 
     @property
     def source(self) -> str:
         """Its source."""
+        if self.by_ratio:
+            return BY_RATIO
         if math.isinf(self.sigma):
             return UNTOLD
         if self.prior is None or self.sigma <= FROM_DATA * self.prior:
@@ -102,8 +102,8 @@ class Carried:
     """The spacecraft at ``time`` s: ``values`` (k,) and ``covariance`` (k, k) of the inputs
     ``names`` of dispersions.
 
-    They are A, C (kg m²), omega0_1 … omega0_3 (rad/s, axes of the file) and ``thrust`` of thrusters
-    (factors).
+    They are A, C (kg m², unless the spin is steady), omega0_1 … omega0_3 (rad/s, axes of the file)
+    and ``thrust`` of thrusters (factors).
     """
 
     time: float
@@ -161,14 +161,15 @@ def carried(fitted: Fit, time: float) -> Carried:
                     f"thrust {member.name}": parameter.name for member in channels[name].thrusters
                 }
     more = ({WHEEL: "wheel"} if fitted.index("wheel") is not None else {}) | factors
-    names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *more)
+    moments = () if fitted.steady else ("A", "C")
+    names = (*moments, "omega0_1", "omega0_2", "omega0_3", *more)
 
     def inputs(values: Values) -> Vector:
         body, state = model.at(values, time)
         rates = body.inertia.axes @ state.rates
         return np.array(
             [
-                *in_moments(model.spacecraft, values),
+                *in_moments(model.spacecraft, values)[: len(moments)],
                 *rates,
                 *(values[name] for name in more.values()),
             ]
@@ -356,7 +357,8 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         # |ω| by its part along ω as estimated: at no nutation |ω| has no derivative.
         along = x * math.cos(phase0) + y * math.sin(phase0)
         nutation = math.copysign(inertia.cones(state.rates, sense).nutation, along)
-        return np.array([state.spin, nutation, along, phase0 + turned])
+        across = y * math.cos(phase0) - x * math.sin(phase0)
+        return np.array([state.spin, nutation, along, phase0 + turned, across])
 
     omega = complex(*spacecraft.rates[:2])
     # Carried to another time the phase is not comparable with that of the file.
@@ -369,12 +371,17 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
         ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
     )
-    for (key, label, unit, file, prior), (value, sigma) in zip(
-        rows, _each(fitted, motion), strict=True
-    ):
-        shown = sigma if key != "phase" or model.record.shows_turn else math.inf
+    values, covariance = _told(fitted, motion)
+    sigmas = np.sqrt(np.diag(covariance))
+    if fitted.steady:
+        # Neither part of ω is seen, and |ω| is off by both: their mean squares add.
+        sigmas[1:3] *= math.hypot(1.0, sigmas[4] / sigmas[2])
+    if not model.record.shows_turn:
+        sigmas[3] = math.inf
+    motions = zip(rows, values[:4].tolist(), sigmas[:4].tolist(), strict=True)
+    for (key, label, unit, file, prior), value, sigma in motions:
         if key != "phase" or not fitted.steady:  # without nutation there is none
-            yield Estimate(key, label, unit, 1.0 / DEG, value, shown, file, prior)
+            yield Estimate(key, label, unit, 1.0 / DEG, value, sigma, file, prior)
 
 
 def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:
@@ -386,7 +393,7 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
 
     def body(values: Values) -> Vector:
         A, C = in_moments(spacecraft, values)
-        return np.array([values[RATIO], 1.0 - values[RATIO], A, C])
+        return np.array([C / A, 1.0 - C / A, A, C])
 
     def rate(values: Values) -> Vector:
         """Rate of a small nutation in the body."""
@@ -405,11 +412,13 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         ("A", "A", "kg m²", inertia.A, of_A),
         ("C", "C", "kg m²", inertia.C, of_C),
     )
+    alone = fitted.index("A") is None
     for (key, label, unit, file, prior), (value, sigma) in zip(
         rows, _each(fitted, body), strict=True
     ):
         if sigma > 0.0:
-            yield Estimate(key, label, unit, 1.0, value, sigma, file, prior)
+            by_ratio = alone and key in ("A", "C")
+            yield Estimate(key, label, unit, 1.0, value, sigma, file, prior, by_ratio)
     if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
         # Told much better than C/A and ω3, where the file alone tells ω3.
         file = inertia.nutation_rate(spacecraft.spin)

@@ -19,7 +19,7 @@ from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.parts import by_the_sun, direction_columns
-from nutdamp.views.text import steering
+from nutdamp.views.text import duration, steering
 from nutdamp.views.verdict import stated
 
 if TYPE_CHECKING:
@@ -77,7 +77,8 @@ def flight_figure(
     draw = drawings[name]
     seen = geometry.drawn(flight, track)
     until, end = float(seen.t[-1]), float(track.t[-1])
-    part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
+    drawn = f"; drawn: the first {duration(until)} of {duration(end)}"
+    part = drawn if until < 0.99 * end else ""
     told = None if judged is None else stated(judged)
     return style.finished(draw(flight, seen), flight.spacecraft, title(flight) + part, told)
 
@@ -90,9 +91,7 @@ def title(flight: Flight) -> str:
     how = " ".join(
         filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}"))
     )
-    fired = (
-        f"firings: {count} until {style.number(flight.schedule.end)} s" if count else "no firing"
-    )
+    fired = f"firings: {count} until {duration(flight.schedule.end)}" if count else "no firing"
     swings = (
         "" if spacecraft.inertia.symmetric else "at most "
     )  # between two angles, H standing still
@@ -431,7 +430,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(
         track.t[-1], max(ended, low), mark, color=MOTION, markerfacecolor=PAPER, clip_on=False
     )
-    last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
+    last = f"θ at {duration(float(track.t[-1]))}: {style.angle(float(track.nutation[-1]))}"
     axes.set_title(last, loc="right", color=INK, **style.NOTE)
 
 

@@ -66,15 +66,18 @@ def time_unit(until: float) -> tuple[str, float]:
 
 
 def upkeep(plan: LoopPlan) -> str:
-    """Pulses a day and propellant a year of the run from the first quiet on; empty where it never
-    fell quiet, or fired once since: of one firing there is no rate.
+    """Pulses a day and propellant a year of the whole cycles of the run, as a budget counts them,
+    from quiet to quiet; empty where there is none.
+
+    The first cycle, which begins where the initial nutation was left, counts in a run of no other.
     """
     run = plan.flown_run
-    later = [f.pulse for f in run.fired if run.settled is not None and f.pulse.t > run.settled]
-    if run.settled is None or len(later) < 2:
+    if len(run.quiet) < 2:
         return ""
-    lasts = run.until - run.settled
-    text = f"from first quiet on: {style.number(len(later) / lasts * DAY)} pulses a day"
+    begin = run.quiet[0] if len(run.quiet) == 2 else run.quiet[1]
+    lasts = run.quiet[-1] - begin
+    later = [firing.pulse for firing in run.fired if begin < firing.pulse.t < run.quiet[-1]]
+    text = f"from quiet to quiet: {style.number(len(later) / lasts * DAY)} pulses a day"
     masses = [pulse.propellant for pulse in later if pulse.propellant is not None]
     if len(masses) < len(later):
         return text

@@ -310,7 +310,7 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     estimates = dict(zip(carried.names, carried.values.tolist(), strict=True))
     drawn_alone = tree.get("dispersions", "inertia_tensor") is not None
     for key in () if drawn_alone else ("A", "C"):
-        if sigmas[key] > 0.0:
+        if sigmas.get(key, 0.0) > 0.0:
             percent = 100.0 * sigmas[key] / estimates[key]
             yield Edit(("dispersions", key), {"normal": f"{percent:.6g} %"})
     rates = [math.degrees(sigmas[f"omega0_{axis}"]) for axis in (1, 2, 3)]

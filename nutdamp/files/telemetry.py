@@ -59,9 +59,7 @@ def record_of(history: Contents, spacecraft: Spacecraft, schedule: Schedule) -> 
 
 
 TIMES = ("t_s", "utc")
-JUMPS = (
-    "; the track of an impulse sum has two rows at each pulse: write it by `simulate --flown --csv`"
-)
+JUMPS = "; at ideal impulses a track has two rows: name their schedule by --schedule"
 RATES = {f"{name}_rad_s": (name, 1.0) for name in GYROS} | {
     f"{name}_deg_s": (name, math.pi / 180.0) for name in GYROS
 }
@@ -174,7 +172,8 @@ def _read_samples(
             1, CROSSED[0], "no direction: that of the Sun needs the key sun in the spacecraft file"
         )
     table.expect()
-    times, columns = _samples(table, spacecraft)
+    impulses = [pulse.t for pulse in schedule if pulse.on_time == 0.0]
+    times, columns = _samples(table, spacecraft, impulses)
     table.check()
     signals = _signals(table, columns, spacecraft)
     for name in sorted(KIND.keys() & signals.keys()):
@@ -187,6 +186,11 @@ def _read_samples(
     _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
     table.check()
+    # A track has the motion before and after an impulse at one time: neither is a sample.
+    jumps = np.flatnonzero(np.diff(times) == 0.0)
+    both = np.concatenate([jumps, jumps + 1])
+    times = np.delete(times, both)
+    signals = {name: np.delete(values, both) for name, values in signals.items()}
     return Record(times, signals, seen, step, schedule), table.warned
 
 
@@ -197,8 +201,12 @@ def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
     return spread
 
 
-def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Vector]]:
-    """Times of the rows (n,) s, and the columns (n,) of measurements, NaN where they are empty."""
+def _samples(
+    table: Table, spacecraft: Spacecraft, impulses: Sequence[float] = ()
+) -> tuple[Vector, dict[str, Vector]]:
+    """Times of the rows (n,) s, two alike at ``impulses`` (s) only, and the columns (n,) of
+    measurements, NaN where they are empty.
+    """
     table.check()
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
@@ -219,7 +227,8 @@ def _samples(table: Table, spacecraft: Spacecraft) -> tuple[Vector, dict[str, Ve
         except ValueError as reason:
             row.fault(column, str(reason))
             continue
-        if time is not None and moments and time <= moments[-1]:
+        twice = time in impulses and time in moments[-1:]
+        if time is not None and moments and time <= moments[-1] and not twice:
             row.fault(
                 column,
                 f"{row[column]} is not after the sample before, at {moments[-1]:.9g} s"

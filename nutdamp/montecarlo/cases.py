@@ -244,15 +244,6 @@ class DispersedCases:
         return None if self.spent is None else sum(self.spent, 0.0)
 
     @property
-    def sheds(self) -> list[tuple[Cases, Cases]] | None:
-        """Decrease of A and C by each pulse, kg m²; None where they stay."""
-        if self.per_kg is None or self.spent is None:
-            return None
-        across = 0.5 * (self.per_kg[0] + self.per_kg[1])
-        axial = self.per_kg[2]
-        return [(kg * across, kg * axial) for kg in self.spent]
-
-    @property
     def A(self) -> Cases:
         """Transverse moment of the equivalent symmetric body, kg m²."""
         first, second, _ = self.moments

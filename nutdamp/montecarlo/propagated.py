@@ -1,11 +1,4 @@
-"""Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
-
-The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. In the frame that
-turns with the nutation (`motion.nutated`), by the phase aα with α = ∫ω3 dt, the rates of a free
-symmetric body stay: Ω = ω0 + Σ J/A e^{iaα}. So a pulse adds to a vector, and a coast turns a
-quaternion. Nothing takes an absolute value or compares: the same code runs on complex arrays, which
-gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
-"""
+"""Cases flown, many at once, through real pulse widths."""
 
 from __future__ import annotations
 
@@ -13,14 +6,13 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import TINY, cos_sin, gauss_legendre
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import forced, make_dynamics, torques_of
 from nutdamp.montecarlo.cases import (
@@ -30,18 +22,14 @@ from nutdamp.montecarlo.cases import (
     Thrusting,
     Triple,
     in_body,
-    nothing,
     number_of,
-    plus,
     rotated,
-    times,
     triple,
     watch_over,
 )
-from nutdamp.montecarlo.inputs import TENSOR
 from nutdamp.physics import motion, sky
 from nutdamp.physics.motion import MotionStretch, advance
-from nutdamp.physics.series import Bodies, Forcing
+from nutdamp.physics.series import Bodies
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
@@ -50,12 +38,8 @@ from nutdamp.spacecraft.equipment import firings
 
 Array = NDArray[np.float64]
 
-# standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades
-# slowly
+# standard deviations of times that the effort of cases counts with
 FAR = 8.0
-MOST_NODES = (
-    128  # largest number of nodes of that quadrature: enough for pulses of 20 nutation periods
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,90 +63,6 @@ class Ends:
     disturbed: Ends | None = None  # when the last disturbance has begun or ended, if later
 
 
-@dataclass(frozen=True, eq=False)
-class ClosedForm:
-    """Flies cases of ``model`` by the impulse sum, with the dissipation of the estimate, no
-    disturbances, I1 = I2.
-    """
-
-    model: DispersedModel
-
-    def __call__(self, cases: DispersedCases) -> Ends:
-        """End states of the ``cases``, whose pulses all come in the order of their centres in the
-        first of them.
-        """
-        A, C, wheel = cases.A, cases.C, cases.wheel
-        spacecraft = self.model.spacecraft
-        forcing = Forcing((), spacecraft.growth, wheel, spacecraft.sense)
-        (first, second, _), (along, across, spin) = cases.moments, cases.omega0
-        # H is the true one, I1 ≠ I2 or not
-        before = first * along, second * across, plus(C * spin, wheel)
-        x, y = before[0] / A, before[1] / A
-        turn: tuple[Cases, ...] = (1.0, 0.0, 0.0, 0.0)
-        phase, now = 0.0, 0.0
-        centres = [
-            start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)
-        ]
-        order = np.argsort(
-            [float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable"
-        )
-        for number in order.tolist():
-            coast = np.asarray(centres[number] - now)
-            now = centres[number]
-            (x, y, spin), turn, angle = motion.nutated(A, C, forcing, (x, y, spin), turn, coast)
-            phase = phase + angle
-            # Half of the propellant goes before the pulse and half after it, the rates as they are.
-            sheds = (0.0, 0.0) if cases.sheds is None else cases.sheds[number]
-            A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
-            a = 1.0 - C / A
-            rate = plus(a * spin, -wheel / A)
-            impulse, width, nodes = (
-                cases.impulses[number],
-                cases.widths[number],
-                self._nodes[number],
-            )
-            along, across, gained = _effective(
-                impulse, rate, a / C, width, nodes, spacecraft.growth
-            )
-            cosine, sine = cos_sin(phase)
-            x = x + (along * cosine - across * sine) / A
-            y = y + (along * sine + across * cosine) / A
-            spin = spin + gained / C
-            A, C = A - 0.5 * sheds[0], C - 0.5 * sheds[1]
-        momentum = A * x, A * y, plus(C * spin, wheel)
-        after = cases.of_estimate(carried(turn, momentum))
-        return Ends(
-            momentum=cases.untwisted(momentum),
-            before=cases.of_estimate(before),
-            after=after,
-            pointed=rotated(after, cases.tilt),
-            spin=spin,
-            spin_change=spin - cases.omega0[2],
-            propellant=cases.propellant,
-            drained=cases.drained,
-        )
-
-    @cached_property
-    def _nodes(self) -> tuple[int, ...]:
-        """Quadrature nodes of each pulse, from the largest phase it may span."""
-        spacecraft = self.model.spacecraft
-        A = spacecraft.inertia.A
-        C = spacecraft.inertia.C
-        spin = abs(spacecraft.spin)
-        off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
-        tensor = max(off.get(name, 0.0) for name in TENSOR)
-        off_A, off_C = off.get("A", tensor), off.get("C", tensor)
-        ratio = max(
-            abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A))
-        )
-        added = math.fsum(float(np.linalg.norm(pulse.impulse)) for pulse in self.model.schedule) / C
-        rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
-        rate += (abs(spacecraft.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(
-            A - off_A, 0.25 * A
-        )
-        return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
-
-
 def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
     """``vector`` turned by the quaternion ``turn``, which rounding has left a little off unit
     length.
@@ -176,81 +76,6 @@ def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
         y + scale * (w * j + c * i - a * k),
         z + scale * (w * k + a * j - b * i),
     )
-
-
-def _effective(
-    impulse: Triple, rate: Cases, slope: Cases, on_time: Cases, nodes: int, growth: float
-) -> tuple[Cases, Cases, Cases]:
-    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see
-    `response.width_factor`.
-
-    The factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ = (ν + aJ3/2C)τ/2, β
-    = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate``
-    is ν as it begins, ``slope`` a/C.
-    """
-    along, across, axial = impulse
-    if nothing(on_time):
-        return impulse
-    half = 0.5 * on_time
-    if nothing(axial):
-        angle = rate * half + TINY
-        if growth == 0.0:
-            tangent = np.tan(0.5 * angle)
-            factor = 2.0 * tangent / ((1.0 + tangent * tangent) * angle)
-            return times(along, factor), times(across, factor), 0.0
-        (cosine, sine), grown = cos_sin(angle), growth * half
-        level, slant = sine * np.cosh(grown), cosine * np.sinh(grown)
-        scale = 1.0 / (angle * angle + grown * grown)
-        real, imaginary = (
-            (level * angle + slant * grown) * scale,
-            (slant * angle - level * grown) * scale,
-        )
-        return _turned(along, across, real, imaginary, 0.0)
-    gained = slope * axial
-    swing, bend = (rate + 0.5 * gained) * half, 0.25 * gained * half
-    real, imaginary = 0.0, 0.0
-    for node, weight in _legendre(nodes):
-        # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the
-        # bend.
-        level, slant = cos_sin(swing * node)
-        grown = np.exp(growth * half * node)
-        level, slant = (
-            0.5 * weight * level * (grown + 1.0 / grown),
-            0.5 * weight * slant * (grown - 1.0 / grown),
-        )
-        cosine, sine = cos_sin(bend * (1.0 + node * node))
-        real = real + level * cosine + slant * sine
-        imaginary = imaginary + level * sine - slant * cosine
-    return _turned(along, across, real, imaginary, axial)
-
-
-def _turned(
-    along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases
-) -> tuple[Cases, Cases, Cases]:
-    """Complex number ``along``, ``across`` times another, and ``axial``."""
-    first = plus(times(along, real), times(-1.0, times(across, imaginary)))
-    return first, plus(times(along, imaginary), times(across, real)), axial
-
-
-def nodes_for(phase: float) -> int:
-    """Fewest Gauss-Legendre nodes (even) that integrate cos(``phase``·x) over |x| <= 1 to rounding.
-
-    By the error of the n-point rule, φ^{2n} 2^{2n+1} (n!)^4 / ((2n+1) ((2n)!)^3).
-    """
-    for nodes in range(2, MOST_NODES, 2):
-        growing = 2 * nodes * math.log(2.0 * max(phase, 1e-3)) + 4.0 * math.lgamma(nodes + 1)
-        if growing - math.log(2 * nodes + 1) - 3.0 * math.lgamma(2 * nodes + 1) < math.log(1e-17):
-            return nodes
-    return MOST_NODES
-
-
-@cache
-def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
-    """Positive nodes of an even Gauss-Legendre rule,
-    with weights for the mean of an even function.
-    """
-    places, weights = gauss_legendre(nodes)
-    return tuple(zip(places[nodes // 2 :].tolist(), weights[nodes // 2 :].tolist(), strict=True))
 
 
 def fly(
@@ -651,74 +476,7 @@ def fly_pulses(
 def _fly_block(
     bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
 ) -> None:
-    """Fly one block, in place."""
-    edges = pulses.edges
-    if not len(edges):
-        return
-    usual = np.argsort(edges.mean(axis=1), kind="stable")
-    sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
-    if sorted_alike.all():
-        _fly_alike(bodies, rates, quaternion, pulses, watch, usual)
-        return
-    for cases, alike in (
-        (np.flatnonzero(sorted_alike), True),
-        (np.flatnonzero(~sorted_alike), False),
-    ):
-        if len(cases):
-            flown, turned = rates[:, cases], quaternion[:, cases]
-            chosen = (
-                bodies.some(cases),
-                flown,
-                turned,
-                pulses.some(cases),
-                watch and watch.some(cases),
-            )
-            if alike:
-                _fly_alike(*chosen, usual)
-            else:
-                _fly_each(*chosen)
-            rates[:, cases], quaternion[:, cases] = flown, turned
-
-
-def _fly_alike(
-    bodies: Bodies,
-    rates: Array,
-    quaternion: Array,
-    pulses: Pulses,
-    watch: Observer | None,
-    order: NDArray[np.intp],
-) -> None:
-    """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
-    edges, slopes = pulses.edges, pulses.slopes
-    firsts, _ = pulses.torques
-    half = None if pulses.sheds is None else 0.5 * pulses.sheds
-    now = np.zeros(rates.shape[1])
-    on = set[int]()
-    for edge in order.tolist():
-        torque = slope = None
-        if on:
-            acting = sorted(on)
-            torque = np.sum(firsts[acting], axis=0)
-            if slopes is not None:
-                slope = np.sum(slopes[acting], axis=0)
-                torque += sum(slopes[number] * (now - edges[2 * number]) for number in acting)
-        _advance(
-            MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch
-        )
-        now = edges[edge]
-        number, ends = divmod(edge, 2)
-        bodies = bodies.lighter(None if half is None else half[number])
-        ideal = pulses.on_times[number] == 0.0
-        if not ideal.all():
-            (on.remove if ends else on.add)(number)
-        if not ends and ideal.any():
-            rates += np.where(ideal, pulses.impulses[number] / bodies.moments, 0.0)
-
-
-def _fly_each(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None
-) -> None:
-    """Fly cases with different orders of edges, in place.
+    """Fly one block, in place, from edge to edge of the pulses of each case.
 
     Those that coast from one edge to the next go on in closed form: with times widely dispersed one
     coast may be long where another case has a pulse on, whose steps it would take.
@@ -732,20 +490,20 @@ def _fly_each(
     torque = np.zeros_like(rates)
     slope = None
     for number, edge_of_each in enumerate(order):
-        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
         edge = _of_each(edges, edge_of_each)
         coasts = on[number - 1] == 0 if number else np.ones(len(now), dtype=bool)
-        groups = (
-            (np.flatnonzero(coasts), np.flatnonzero(~coasts))
-            if bodies.free
-            else (np.arange(len(now)),)
-        )
-        for cases in filter(len, groups):
-            part = here.some(cases)
-            if bodies.free and coasts[cases[0]]:
-                part = part._replace(torque=None, slope=None)
-            _advance(part, (edge - now)[cases], watch and watch.some(cases))
-            rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
+        here = MotionStretch(bodies, now, rates, quaternion, torque, slope)
+        if coasts.all():
+            _advance(here._replace(torque=None, slope=None), edge - now, watch)
+        elif not (bodies.free and coasts.any()):
+            _advance(here, edge - now, watch)
+        else:
+            for cases, coasting in ((coasts, True), (~coasts, False)):
+                part = here.some(np.flatnonzero(cases))
+                if coasting:
+                    part = part._replace(torque=None, slope=None)
+                _advance(part, (edge - now)[cases], watch and watch.some(np.flatnonzero(cases)))
+                rates[:, cases], quaternion[:, cases] = part.rates, part.quaternion
         if slope is not None:
             torque = torque + slope * (edge - now)
         pulse, ends = np.divmod(edge_of_each, 2)
@@ -763,6 +521,8 @@ def _fly_each(
 
 def _of_each(values: Any, rows: NDArray[np.intp]) -> Any:
     """Values (m, …, n) of one row of each case, (…, n)."""
+    if (rows == rows[0]).all():
+        return values[rows[0]]
     index = rows.reshape(1, *(1,) * (values.ndim - 2), len(rows))
     return np.take_along_axis(values, index, axis=0)[0]
 

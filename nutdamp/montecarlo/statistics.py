@@ -1,8 +1,8 @@
 """Statistics of a study: output vectors, percentiles, intervals of shares, sensitivities.
 
-First-order sensitivities are those of the closed form by complex-step differentiation (Squire &
-Trapp 1998). The shares from the cases are first-order Sobol indices, from the means of the outcome
-over equally likely intervals of each input (the correlation ratio, Pearson 1905).
+First-order sensitivities are central differences of the cases as flown. The shares from the cases
+are first-order Sobol indices, from the means of the outcome over equally likely intervals of each
+input (the correlation ratio, Pearson 1905).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Triple, parts_of
 from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
-from nutdamp.montecarlo.propagated import ClosedForm, Ends
+from nutdamp.montecarlo.propagated import Ends
 from nutdamp.physics.attitude import angle_of_parts
 
 SHOWN, CERTAIN = 1.9599639845400536, 4.891638475714779
@@ -228,8 +228,6 @@ class Worst:
         self.cases, self.severities = cases[order], severities[order]
 
 
-# imaginary step, as a share of an input's size: nothing is subtracted, so no digits are lost
-STEP = 1e-30
 SHARE = 1e-3  # step of central differences, as a share of an input's size
 CLASSES = 128  # intervals of an input over which the cases are averaged, at most
 CLASS_SIZE = 32  # cases in each of them, at least
@@ -273,55 +271,28 @@ class FirstOrder:
         return np.asarray(squares / (squares.sum() or 1.0))
 
 
-# relative difference up to which derivatives of the closed form may replace those of the flight
-ALIKE = 0.01
+# change of a row of `vectors` by two steps, rad, rad/s or kg, below which it is rounding: an
+# attitude changes no nutation, and left 1e-15
+ROUNDING = 1e-12
 
 
-def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """Derivatives of the model that ``fly`` flies: of the closed form, without rounding, where it
-    agrees with those.
+def first_order(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+    """Derivatives about nominal values (and biases) of the model that ``fly`` flies, by central
+    differences: each input in turn is off by a step of either sign.
     """
-    flown = by_differences(model, fly)
-    if model.schedule.blocks or not flown.inputs:
-        return flown
-    closed, jacobian = first_order(model).jacobian, flown.jacobian
-    for rows in VECTORS.values():
-        apart, size = (
-            np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian)
-        )
-        alike = apart <= ALIKE * size
-        jacobian[rows, alike] = closed[rows, alike]
-    return flown
-
-
-def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun
-    pulses.
-    """
-    steps = np.array([SHARE * abs(entry.size) for entry in model.inputs.drawn])
-    out = _varied(model, fly, np.stack([steps, -steps], axis=1))
-    return FirstOrder(model.inputs.drawn, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, model.groups)
-
-
-def first_order(model: DispersedModel) -> FirstOrder:
-    """Derivatives of the outcome by every drawn input, by the closed form of ``model``."""
-    steps = np.array([STEP * abs(entry.size) for entry in model.inputs.drawn])
-    out = _varied(model, ClosedForm(model), 1j * steps[:, None])
-    return FirstOrder(model.inputs.drawn, out.imag / steps, model.groups)
-
-
-def _varied(
-    model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps: NDArray[Any]
-) -> NDArray[Any]:
-    """Outcome (11, d k) about nominal values (and biases), with each input off by its ``steps`` (d,
-    k) in turn.
-    """
-    draws: dict[str, NDArray[Any]] = {}
-    for index, entry in enumerate(model.inputs.drawn):
-        draw = np.zeros_like(steps)
-        draw[index] = steps[index]
-        draws[entry.name] = draw.ravel() + (entry.size if entry.kind == "bias" else 0.0)
-    return vectors(model, fly(model.cases(draws)), steps.size) if draws else np.empty((ROWS, 0))
+    inputs = model.inputs.drawn
+    steps = np.array([SHARE * abs(entry.size) for entry in inputs])
+    if not inputs:
+        return FirstOrder(inputs, np.empty((ROWS, 0)), model.groups)
+    draws = {}
+    for index, entry in enumerate(inputs):
+        draw = np.zeros(2 * len(inputs))
+        draw[2 * index : 2 * index + 2] = steps[index], -steps[index]
+        draws[entry.name] = draw + (entry.size if entry.kind == "bias" else 0.0)
+    out = vectors(model, fly(model.cases(draws)), 2 * len(inputs))
+    apart = out[:, ::2] - out[:, 1::2]
+    apart[np.abs(apart) < ROUNDING] = 0.0
+    return FirstOrder(inputs, 0.5 * apart / steps, model.groups)
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:

@@ -47,8 +47,8 @@ from nutdamp.montecarlo.statistics import (
     FirstOrder,
     Sketch,
     Worst,
-    as_flown,
     correlated_shares,
+    first_order,
     measure,
     sampled_shares,
     share_interval,
@@ -243,7 +243,7 @@ class Study(DrawnCases):
     @cached_property
     def first_order(self) -> FirstOrder:
         """Sensitivities of the flight."""
-        return as_flown(self.model, self.flies)
+        return first_order(self.model, self.flies)
 
     def ends_of(self, draws: Draws) -> Ends:
         """End state of one case with these deviations; none: of the estimate itself."""

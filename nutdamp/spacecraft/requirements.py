@@ -53,8 +53,8 @@ class Bound(NamedTuple):
     """Bound of a part: its value may not exceed ``limit``, or, of the inner edge of a cone, not
     fall below it.
 
-    ``required`` by file or command line, else the definition of damped. ``keep``: the cone of a
-    bound on the way.
+    ``required`` by file or command line, else the definition of damped, or, ``by_loop``, what the
+    thresholds of a loop let stand. ``keep``: the cone of a bound on the way.
     """
 
     part: Part
@@ -62,6 +62,7 @@ class Bound(NamedTuple):
     required: bool
     keep: Keep | None = None
     inner: bool = False
+    by_loop: bool = False
 
     @property
     def label(self) -> str:

@@ -26,7 +26,7 @@ from nutdamp.estimation.results import (
     estimates,
     pointings,
 )
-from nutdamp.estimation.search import Fit
+from nutdamp.estimation.search import MOVED, Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import heading, opening
@@ -80,6 +80,11 @@ def _changed(change: float) -> str:
     if abs(change) <= NOTHING:
         return "0"
     return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
+
+
+def _stays(row: Estimate) -> bool:
+    """True where the file has the value already, within its tolerance."""
+    return row.change is not None and abs(row.change) <= MOVED
 
 
 def _digits(estimate: Estimate) -> int:
@@ -199,15 +204,17 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
     if outliers:
         test += f"; outliers left out: {outliers}"
     record, values, spacecraft = fit.model.record, fit.named, fit.model.spacecraft
-    wheel = values.get("wheel", spacecraft.inertia.wheel) / in_moments(spacecraft, values)[0]
+    A, C = in_moments(spacecraft, values)
+    wheel = values.get("wheel", spacecraft.inertia.wheel) / A
     # Of the nutation in the body, small angles.
-    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", spacecraft.spin) - wheel)
+    rate = abs((1.0 - C / A) * values.get("omega_3", spacecraft.spin) - wheel)
     turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
     fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
     what = f", {record.start:g} s to {record.end:g} s{turns}{fired}"
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), what)
     head = [*opening(spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
-    table = DataTable("Estimates", ESTIMATES, rows)
+    # Where not all fit, what moved from the file stands before what did not.
+    table = DataTable("Estimates", ESTIMATES, rows if verbose else sorted(rows, key=_stays))
     head.append(Text(f"motion at t = {time:g} s"))
     directions = pointing_table(fit, time)
     if directions.rows:
@@ -229,7 +236,7 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[Note]:
     of_file = [estimate.label for estimate in rows if estimate.source == UNTOLD]
     if of_file:
         yield note("fit-kept", estimates=", ".join(of_file))
-    both = float(carried(fit, fit.model.start).correlation[0, 1])
+    both = 0.0 if fit.steady else float(carried(fit, fit.model.start).correlation[0, 1])
     tied = [f"A and C {both:+.4f}"] if abs(both) > CORRELATED else []
     tied += [
         f"{first} and {second} {value:+.3f}"

@@ -49,7 +49,7 @@ MET = {True: "met", False: "NOT met", None: MISSING}
 """Words for one bound, or for the requirement as a whole."""
 
 DAMPED = {Part.DISTANCE: "reached"}
-"""Words for a bound that nobody requires; of others damped."""
+"""Words for a bound that nobody requires; of others damped, of one by a loop held."""
 
 SHORTLY = {"why-single-pulses": "single pulses"}
 """Words for reasons that are too long for a table."""
@@ -152,7 +152,8 @@ def loop_sentence(verdict: Verdict) -> str:
     """Status and sentence of a closed loop, which fires by what it sees and not by a plan."""
     words = "ENOUGH" if verdict.flies else lead(verdict)
     if not verdict.required:
-        return f"HELD: the loop falls quiet; {', '.join(map(bound_word, verdict.lines))}"
+        words = "HELD" if all(line.met for line in verdict.lines) else "NOT HELD"
+        return f"{words}: the loop falls quiet; {', '.join(map(bound_word, verdict.lines))}"
     return f"{words}: {statement(verdict)}"
 
 
@@ -166,7 +167,7 @@ def line_word(line: Line) -> str:
     """Verdict on one bound."""
     if line.bound.required:
         return MET[line.met]
-    word = DAMPED.get(line.bound.part, "damped")
+    word = "held" if line.bound.by_loop else DAMPED.get(line.bound.part, "damped")
     return word if line.met else f"NOT {word}"
 
 

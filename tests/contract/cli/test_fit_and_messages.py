@@ -163,6 +163,19 @@ def test_what_coarse_steps_do_to_an_estimate_is_in_its_sigma(run: Run, tmp_path:
     assert results(tmp_path)["kept"] == ["bias_omega_3"]
 
 
+def test_a_track_of_ideal_impulses_tells_what_they_do(run: Run, tmp_path: Path) -> None:
+    """At an impulse it has two rows, of which neither is a sample; the first is at the start."""
+    body = str(places.CONFIGS / "magnus-a03.yaml")
+    run("plan", body, "--scheme", "two-pulse", "--csv", "pulses.csv")
+    run("simulate", body, "--scheme", "two-pulse", "--flown", "--csv", "track.csv")
+    fitted = run("fit", "track.csv", body, "--schedule", "pulses.csv", "--json", "f.json")
+    assert fitted.returncode == 0
+    rows = estimates(tmp_path)
+    assert rows["thrust steerable"]["value"] == pytest.approx(1.0, abs=1e-6)
+    assert rows["C/A"]["value"] == pytest.approx(0.7, abs=1e-7)
+    assert run("fit", "track.csv", body).returncode == 2
+
+
 def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_path: Path) -> None:
     files = str(places.case("fit-steady-spin.csv")), str(places.case("fit-tiny.yaml"))
     assert run("fit", *files, "--json", "f.json").returncode == 0

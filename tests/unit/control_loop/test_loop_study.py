@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import places
 from support.builders import present
 from support.cases import spread
 from support.dispersed import jet, normal
 from support.golden import refused
 from support.loops import fired_by, fires, rad
 
+import nutdamp
 from nutdamp.control_loop.controller import Ending
 from nutdamp.control_loop.dispersion import (
     OUTPUTS,
@@ -37,6 +39,7 @@ from nutdamp.spacecraft.model import Attitude, Disturbance, Goal, Keep, Requirem
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.loop_cases import LoopCasesWriter
+from nutdamp.views.verdict import line_word, loop_sentence
 
 VALVE = Trapezoid(0.01, 0.02, 0.01, 0.01)
 FORCES = {
@@ -408,6 +411,21 @@ def test_loops_fire_alike_whether_they_look_while_nothing_can_show_or_not(
     assert np.array_equal(asleep.of("firings"), awake.of("firings"))
     assert 1.5 * looked[0] < looked[1]
     assert asleep.of("firings").mean() > 3.0
+
+
+def test_a_loop_holds_the_nutation_within_its_thresholds_alone_and_in_cases() -> None:
+    """Nothing is required: start times 1.05 and noise, 0.4454 deg, rounded up; not 1 % of what is
+    there as of a plan, 0.006 deg, which no loop is to reach.
+    """
+    settings = {"dispersions.A": "{normal: 0.5 %}"}
+    body = nutdamp.load(places.CONFIGS / "ulysses.yaml", set=settings)
+    flown = run(LoopResults(loop_study(body, 400.0, seed=1), 20))
+    for verdict in (LoopDispersion(flown).verdict, loop_of(body, 400.0).verdict):
+        (line,) = verdict.lines
+        assert line.met
+        assert math.degrees(line.bound.limit) == pytest.approx(0.45)
+        assert line_word(line) == "held"
+        assert loop_sentence(verdict) == "HELD: the loop falls quiet; nutation held"
 
 
 def test_as_many_cases_are_flown_as_show_the_share_required_where_one_of_them_fails() -> None:

@@ -27,6 +27,7 @@ from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantis
 from nutdamp.estimation.results import Estimate, Fitted, estimates
 from nutdamp.estimation.search import Fit, residuals, search, units_of
 from nutdamp.files.telemetry import read_telemetry
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.fit import ESTIMATES, fit_screen
 from nutdamp.views.tables import DataTable
@@ -380,6 +381,21 @@ def test_the_default_screen_is_short(fitted: Fitted) -> None:
     assert ratio == same
     assert "samples" in full
     assert "samples" not in brief
+
+
+def test_what_moved_is_shown_before_what_did_not() -> None:
+    """Of more rows than the screen has, the thrust that moved by 10 sigmas of the file is one."""
+    body = nutdamp.example()
+    channel = body.channels[0]
+    record = silent(
+        *GYROS, "axis_x", "axis_y", "axis_z", schedule=Schedule((channel_pulse(channel, 1.0, 0.5),))
+    )
+    name = f"thrust {channel.name}"
+    fitted = told(body, record, {name: 1.3}, {name: 1e-3})
+    lines = printed(fit_screen(fitted, 0.0, verbose=False), 120)
+    hidden = next(at for at, line in enumerate(lines) if line.startswith("… "))
+    (thrust,) = (at for at, line in enumerate(lines) if line.startswith("thrust factor"))
+    assert thrust < hidden
 
 
 def test_values_are_shown_to_what_their_sigmas_leave() -> None:

@@ -27,7 +27,6 @@ from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.propagated import RealWidths
-from nutdamp.montecarlo.statistics import by_differences
 from nutdamp.montecarlo.study import SEED, STAGES, Results, flown_in_stages, run, study_of
 from nutdamp.planning import chance_plan, robust, screening
 from nutdamp.planning import plan as planning
@@ -875,10 +874,6 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
         together = math.sqrt((np.abs(own) ** 2).sum()) / size
         each = [names.index(name) for name in names if " pulse " in name]
         assert together == pytest.approx(np.linalg.norm(expected[rows, each]), rel=0.03)
-    flown = by_differences(model, RealWidths(model)).effects(
-        "nutation"
-    )  # central differences of real widths
-    assert flown == pytest.approx(kernel.effects("nutation"), rel=0.02, abs=1e-7)
 
 
 def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
