@@ -490,27 +490,36 @@ def _size(pulse: Pulse) -> float:
     return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
 
 
-def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[], bool]) -> Vector:
+def solve(
+    residual: Callable[[Vector], Vector],
+    free: Vector,
+    enough: Callable[[], bool],
+    slopes: Callable[[Vector, Vector], Vector] | None = None,
+) -> Vector:
     """Unknowns (n,) that make ``residual`` (m,) least in norm.
 
     ``free`` (n, 4): start, natural size and bounds of each. With more unknowns than equations the
-    nearest solution. It is left as it is once there was ``enough`` work.
+    nearest solution. It is left as it is once there was ``enough`` work. ``slopes`` of unknowns and
+    their residual, (m, n) in natural sizes, are asked for once, and corrected at each step (Broyden
+    1965); without them they are differences of residuals at every step.
     """
     start, scale, lower, upper = free.T
     difference = 1e-6  # in scaled unknowns: the error of the slopes, far below their size
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
+    jacobian = None if slopes is None or norm <= CONVERGED else slopes(x, value)
     for _ in range(STEPS):
         if norm <= CONVERGED or enough():
             break
-        columns = [
-            (residual(x + moved) - value) / difference for moved in np.diag(difference * scale)
-        ]
-        step = bounded_step(np.column_stack(columns), value, x, scale, lower, upper)
-        before = norm
+        if slopes is None:
+            moved = x + np.diag(difference * scale)
+            jacobian = np.column_stack([(residual(each) - value) / difference for each in moved])
+        assert jacobian is not None
+        step = bounded_step(jacobian, value, x, scale, lower, upper)
+        before, last, last_value = norm, x, value
         for shrink in range(8):
-            trial = np.clip(x + step * 0.5**shrink, lower, upper)
+            trial = np.clip(last + step * 0.5**shrink, lower, upper)
             trial_value = residual(trial)
             trial_norm = float(np.linalg.norm(trial_value))
             if trial_norm < before:
@@ -518,6 +527,10 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
                 break
         if norm > before * (1.0 - PROGRESS):
             break
+        if slopes is not None:
+            change = (x - last) / scale
+            wrong = value - last_value - jacobian @ change
+            jacobian = jacobian + np.outer(wrong, change) / (change @ change)
     return np.asarray(x)
 
 

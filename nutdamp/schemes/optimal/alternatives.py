@@ -34,7 +34,7 @@ from nutdamp.schemes.catalogue import (
     SchemeOptions,
     TwoPulseOptions,
 )
-from nutdamp.schemes.correction import Correction, SymmetricModel, bounded_step, model_of
+from nutdamp.schemes.correction import Correction, SymmetricModel, model_of, solve
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
@@ -163,10 +163,6 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
 
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
-NEWTON_STEPS, CONVERGED = (
-    25,
-    1e-12,
-)  # for the lengths of burns, and the end error, over |H|, at which they end
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
 HALVINGS = 10
@@ -354,22 +350,15 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
             return np.array([misses(flight, problem.equations) - aside for flight in flown]) / size
         starts = spacecraft.limits.earliest + np.cumsum(rows, axis=1) - rows
         settings = np.hstack([starts[:, firing], rows[:, firing]])
-        return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
-
-    value = left(times[None])[0]
-    for _ in range(NEWTON_STEPS):
-        if np.linalg.norm(value) <= CONVERGED or work.exhausted():
-            break
-        slopes = (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
-        move = bounded_step(
-            slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most)
+        return (
+            task.misses(np.tile(which[firing], (len(rows), 1)), settings, ideal=False)
+            - aside / size
         )
-        for shrink in range(6):
-            trial = np.clip(times + move * 0.5**shrink, 0.0, most)
-            following = left(trial[None])[0]
-            if np.linalg.norm(following) < np.linalg.norm(value):
-                break
-        else:
-            break
-        times, value = trial, following
+
+    def slopes(times: Vector, value: Vector) -> Vector:
+        return (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
+
+    bounds = np.zeros(len(times)), np.full(len(times), most)
+    free = np.column_stack([times, scale, *bounds])
+    times = solve(lambda times: left(times[None])[0], free, work.exhausted, slopes)
     return _burns(problem, which, times)

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude
 from nutdamp.physics.motion import BLOCK, MotionStretch, advance
@@ -36,7 +35,6 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 LEAST_ROOM = 1e-10  # share of the room to a bound that a step must leave
 
 Indices = NDArray[np.int_]
-Complex = NDArray[np.complex128]
 
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
 FLIGHT, CASE = (
@@ -103,28 +101,24 @@ class Task:
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=(), timed=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
-        self._decays = spacecraft.growth != 0.0
-        self._free = dynamics.free and not self._decays
+        self._pace = float(np.linalg.norm(start.rates))
+        self._arcs = dynamics.free and spacecraft.growth == 0.0
         self._linear = None if spacecraft.inertia.symmetric else small_angles(spacecraft, equations)
         self._across = square_to_target(spacecraft)
 
-    def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
+    def misses(self, which: Indices, x: Vector, *, ideal: bool) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
-        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at
-        small angles; 0: the true motion.
+        ``ideal``: pulses act as impulses at their centres, without disturbances, with I1 ≠ I2 as at
+        small angles; else the true motion.
         """
-        parts = [slice(begin, begin + BLOCK) for begin in range(0, len(x), BLOCK)]
-        flown = [self._misses(which[part], x[part], kicks) for part in parts]
-        return np.concatenate([np.zeros((0, len(self.chosen))), *flown])
-
-    def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
-        work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
-        if kicks and self._linear is not None:
+        work.spend(2 * n * (FLIGHT + CASE * count))
+        if ideal and self._linear is not None:
             return self._at_small_angles(self._linear, which, x)
-        flown = self._together if self._free or (kicks and not self._decays) else self._in_turn
-        momentum, turn = flown(which, x, kicks)
+        parts = [slice(begin, begin + BLOCK) for begin in range(0, max(count, 1), BLOCK)]
+        flown = [self._flown(which[part], x[part], ideal) for part in parts]
+        momentum, turn = (np.concatenate(part, axis=1) for part in zip(*flown, strict=True))
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
         shift[inertial @ self.spacecraft.target_axis < 0.0] += (
@@ -148,112 +142,40 @@ class Task:
             left[:, 2:4] -= self.off * x[:, -2:]
         return np.asarray(left / self.momentum)
 
-    def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
+    def _flown(self, which: Indices, x: Vector, ideal: bool) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
-        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(
-            np.linalg.norm(self._start[1])
-        )
-        work.spend(turned * (RADIAN + CASE_RADIAN * count))
+        if not self._arcs:
+            turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1], initial=0.0)) * self._pace
+            work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        bodies = Bodies(moments, *(self._coasting if kicks else self._forced))
+        bodies = Bodies(moments, *(self._coasting if ideal else self._forced))
         now = np.zeros(count)
         for pulse in range(n):
-            begin = x[:, pulse]
-            on_time = x[:, n + pulse]
+            begin, on_time = x[:, pulse], x[:, n + pulse]
             torque = self.torques[which[:, pulse]].T
-            for kick in range(kicks):
-                t = begin + on_time * ((kick + 0.5) / kicks)
-                advance(MotionStretch(bodies, now, rates, turn), t - now)
-                rates += torque * (on_time / kicks) / moments
-                now = t
-            if not kicks:
-                advance(MotionStretch(bodies, now, rates, turn), begin - now)
+            if ideal:
+                begin = begin + 0.5 * on_time
+            advance(MotionStretch(bodies, now, rates, turn), begin - now)
+            now = begin
+            if ideal:
+                rates += torque * on_time / moments
+            else:
                 advance(MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
         return bodies.momentum(rates), turn
 
-    def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
-        """`_in_turn` of a body without external torque, all stretches at once."""
-        # In the frame that turns with the nutation pulses add to H whatever it is, and between them
-        # the body turns about H and its own axis: so the motion at all edges is known first, and
-        # then all turns are. A quaternion is a pair of complex numbers, w + iz and x + iy.
-        count, n = which.shape
-        (A, _, C), rates, turn = self._start
-        wheel = self.spacecraft.inertia.wheel
-        parts = max(kicks, 1)
-        starts = x[:, :n]
-        widths = x[:, n : 2 * n]
-        impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
-        if kicks:
-            shares = (np.arange(kicks) + 0.5) / kicks
-            starts = (starts[:, :, None] + widths[:, :, None] * shares).reshape(count, n * kicks)
-            widths = np.zeros_like(starts)
-        coasts = np.diff(starts, axis=1, prepend=0.0)
-        coasts[:, 1:] -= widths[:, :-1]
-        axial = C * rates[2] + wheel + np.cumsum(impulses[:, :, 2], axis=1)
-        before, pace = axial - impulses[:, :, 2], 1.0 / C - 1.0 / A
-        turned = (pace * before - wheel / C) * coasts
-        within = (pace * (before + 0.5 * impulses[:, :, 2]) - wheel / C) * widths
-        phase = np.cumsum(turned + within, axis=1)
-        begun = np.exp(1j * (phase - within))  # as each pulse begins
-        added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
-        if not kicks and self.torques[:, 2].any():
-            added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(
-                1j * within
-            )
-        elif not kicks:
-            added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
-        after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
-        across = (
-            after - added * begun
-        ) / begun  # in body axes as each pulse begins: H turns back in a coast
-        size = np.sqrt(across.real**2 + across.imag**2 + before**2)
-        cosine, sine = cos_sin(0.5 / A * size * coasts)
-        sine /= np.where(size > 0.0, size, 1.0)
-        half = np.exp(0.5j * turned)
-        first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
-        if not kicks:
-            turns = zip(
-                (first, second), self._pulsed(which, across, before, widths)[1:], strict=True
-            )
-            first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
-        first, second = _product(first, second)
-        momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
-        spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
-        return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
-
-    def _pulsed(
-        self, which: Indices, across: Complex, before: Vector, widths: Vector
-    ) -> tuple[Complex, ...]:
-        """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along
-        it; turn of each.
-        """
-        count = which.size
-        moments = np.repeat(self._start[0][:, None], count, axis=1)
-        rates = (
-            np.array([across.real, across.imag, before - self.spacecraft.inertia.wheel]).reshape(
-                3, -1
-            )
-            / moments
-        )
-        turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
-        bodies = Bodies(moments, *self._coasting)
-        stretch = MotionStretch(
-            bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T
-        )
-        advance(stretch, widths.ravel())
-        pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
-        after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
-        return after * self._start[0][0], *turned
-
-    def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
+    def slopes(
+        self, which: Indices, x: Vector, scale: Vector, here: Vector, *, ideal: bool
+    ) -> Vector:
         """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b,
         equations, …).
         """
         number = x.shape[1]
         moved = x[:, None, :] + DIFFERENCE * scale[:, None, :] * np.eye(number)
-        there = self.misses(np.repeat(which, number, axis=0), moved.reshape(-1, number), kicks)
+        there = self.misses(
+            np.repeat(which, number, axis=0), moved.reshape(-1, number), ideal=ideal
+        )
         changes = there.reshape(*moved.shape[:2], len(self.chosen)) - here[:, None, :]
         return np.swapaxes(changes, 1, 2) / DIFFERENCE
 
@@ -290,20 +212,6 @@ class Task:
             matrix = np.vstack([np.pad(matrix, ((0, 0), (0, 2))), sides])
             levels.append(np.full((count, len(sides)), -math.cos(math.pi / len(sides))))
         return matrix, np.hstack(levels)
-
-
-def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
-    """Product (b,) of quaternions (b, n) in their order, each a pair of complex numbers as in
-    `Task`.
-    """
-    while (count := first.shape[1]) > 1:
-        last = count & ~1
-        u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
-        products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
-        first, second = (
-            np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products
-        )
-    return first[:, 0], second[:, 0]
 
 
 WHOLE, SHARES = (
@@ -347,9 +255,9 @@ class Descent:
     """The descents of ``sequences`` from ``x`` (b, v), which must lie within all bounds."""
 
     def __init__(
-        self, task: Task, sequences: Sequences, x: Vector, *, kicks: int, barrier: float = 0.1
+        self, task: Task, sequences: Sequences, x: Vector, *, ideal: bool, barrier: float = 0.1
     ) -> None:
-        self.task, self.sequences, self.kicks = task, sequences, kicks
+        self.task, self.sequences, self.ideal = task, sequences, ideal
         which, (count, number) = sequences.which, x.shape
         n = which.shape[1]
         # Natural sizes of the unknowns.
@@ -363,13 +271,13 @@ class Descent:
         self.price = np.zeros_like(self.scale)
         self.price[:, n : 2 * n] = (task.costs * task.unit)[which] / task.least
         slack = (x @ rows.T - levels) / size
-        misses = task.misses(which, x, kicks)
+        misses = task.misses(which, x, ideal=ideal)
         self.state = DescentState(
             x=np.array(x),
             slack=slack,
             dual=barrier / slack,
             misses=misses,
-            slopes=task.slopes(which, x, self.scale, misses, kicks),
+            slopes=task.slopes(which, x, self.scale, misses, ideal=ideal),
             prices=np.zeros((count, len(task.chosen))),
             curvature=np.repeat(np.eye(number)[None], count, axis=0),
             barrier=np.full(count, barrier),
@@ -420,7 +328,7 @@ class Descent:
             closer = np.einsum("bri,bi->br", self.rows, move)
             step = _to_bound(state.slack, closer, np.full(len(move), 0.5))[:, None]
             x, slack = state.x + step * move * self.scale, state.slack + step * closer
-            misses = self.task.misses(which, x, self.kicks)
+            misses = self.task.misses(which, x, ideal=self.ideal)
             better = np.abs(misses).sum(axis=1) < np.abs(state.misses).sum(axis=1)
             if not better.any():
                 break
@@ -451,7 +359,7 @@ class Descent:
         if len(line.active):
             line.tried(step[line.active], SHARES)
         x, slack, misses = line.x, line.slack, line.misses
-        slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, self.kicks)
+        slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, ideal=self.ideal)
         change = np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
         curvature = _curved(old.curvature, (x - old.x) / self.scale, change)
         curvature[line.active] = np.eye(x.shape[1])
@@ -514,7 +422,9 @@ class _LineSearch:
         )  # as much of the room must be left
         x = np.where(inside[:, None], old.x[k] + step * self.descent.scale[k], old.x[k])
         slack = np.where(inside[:, None], slack, old.slack[k])
-        misses = self.descent.task.misses(self.descent.sequences.which[k], x, self.descent.kicks)
+        misses = self.descent.task.misses(
+            self.descent.sequences.which[k], x, ideal=self.descent.ideal
+        )
         least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
         enough = (inside & (self._merit(x, slack, misses, k) <= least)).reshape(count, -1)
         stuck = ~enough.any(axis=0)

@@ -296,18 +296,20 @@ class Problem:
         """Cost of a schedule by the program's own prices."""
         return math.fsum(self.prices[pulse.channel] * pulse.on_time for pulse in schedule)
 
-    def worth(self, schedule: Schedule) -> float:
-        """Quantity to be least: the cost, or the number of pulses."""
-        return float(len(schedule)) if self.options.least == "pulses" else self.price(schedule)
+    def rank(self, schedule: Schedule) -> tuple[float, float]:
+        """Quantity to be least, the cost or the number of pulses; then the cost."""
+        price = self.price(schedule)
+        return (float(len(schedule)) if self.options.least == "pulses" else price, price)
 
-    def cheaper(self, known: Schedule | None, other: Schedule | None) -> Schedule | None:
-        """The cheaper of two schedules, of which there may be none; the known with fewer pulses
-        where that counts.
-        """
-        there = [schedule for schedule in (known, other) if schedule is not None]
-        return min(
-            there, key=lambda schedule: (self.worth(schedule), self.price(schedule)), default=None
-        )
+    def cheaper(self, *schedules: Schedule | None) -> Schedule | None:
+        """The cheaper of schedules, of which there may be none; the first of equal ones."""
+        present = [schedule for schedule in schedules if schedule is not None]
+        return min(present, key=self.rank, default=None)
+
+    def error(self, schedule: Schedule) -> float:
+        """End error of a schedule, rad, zero where it is as good as none."""
+        left = self.left(self.flown(schedule))
+        return 0.0 if left <= LEFT else left
 
     def left(self, flown: Flight) -> float:
         """Largest end error of a flight, rad: nutation, distance from the target, and spin as a

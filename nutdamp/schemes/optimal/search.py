@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -62,9 +61,6 @@ refined.
 SETTLED = 0.0005
 """Share of the cost that a further correction must save for another one to follow."""
 
-FEW = 2
-"""Pulses for each equation up to which more pulses are tried."""
-
 WAYS = 3
 """Schedules of other schemes that are corrected to cost less, and exact ones put on ticks."""
 
@@ -90,20 +86,12 @@ NEARLY = 0.05
 """Share of the tightest bound that may be left where no schedule is exact."""
 
 
-class Candidate(NamedTuple):
-    """A schedule with its end ``error``, rad (0: as good as none), and its ``price``."""
-
-    error: float
-    price: float
-    schedule: Schedule
-
-
 class Search(Problem):
-    """The search within one horizon; ``candidates`` are all schedules that it has corrected."""
+    """The search within one horizon; ``tried`` are all schedules that it has corrected."""
 
     def __init__(self, spacecraft: Spacecraft, options: OptimalOptions) -> None:
         super().__init__(spacecraft, options)
-        self.candidates: list[Candidate] = []
+        self.tried: list[Schedule] = []
 
     @cached_property
     def first(self) -> Solution:
@@ -124,10 +112,9 @@ class Search(Problem):
         attempts: list[tuple[float, Attempt]] = [
             (ALWAYS, by_program),
             (DEARER, by_shorter_programs),
-            # With three moments small angles mislead sooner, and no other plan is to be better.
-            (DEARER if symmetric else 0.5 * DEAR, by_other_schemes),
+            # No other plan is to be better: that of two-pulse was, by 1.6 % for despun-comsat.
+            (0.5 * DEAR, by_other_schemes),
             (ALWAYS, by_descent),
-            (SAVED, by_more_pulses),
         ]
         # Infinite where the solver gave up, or the work for it was spent.
         if symmetric and UNMET < self.first.unmet < math.inf:
@@ -159,25 +146,22 @@ class Search(Problem):
         allowed = math.inf if self.options.shift is None else self.options.shift
         return schedule is None or self.flown(schedule).residual.axis_error > allowed + DAMPED_ANGLE
 
-    def candidate(self, flight: Flight, price: float) -> Candidate:
-        """The schedule of a flight, with its price."""
-        error = self.left(flight)
-        return Candidate(0.0 if error <= LEFT else error, price, flight.schedule)
-
-    def best(self, candidates: list[Candidate]) -> Schedule | None:
+    def best(self, schedules: list[Schedule]) -> Schedule | None:
         """The cheapest that leaves no more than `DAMPED_ANGLE`, else what leaves least, where that
         is rounding.
         """
-        self.candidates += candidates
+        self.tried += schedules
         # By starts and on-times on ticks, root sum square; zero without ticks.
         exact = [
-            candidate
-            for candidate in candidates
-            if candidate.error <= math.hypot(*rounded_off(self.spacecraft, candidate.schedule))
+            each
+            for each in schedules
+            if self.error(each) <= math.hypot(*rounded_off(self.spacecraft, each))
         ]
-        if not exact:
-            return None
-        return min(exact, key=lambda each: (max(each.error, DAMPED_ANGLE), each.price)).schedule
+        return min(
+            exact,
+            key=lambda each: (max(self.error(each), DAMPED_ANGLE), self.rank(each)),
+            default=None,
+        )
 
     def nearly(self) -> Schedule | None:
         """The cheapest that leaves a little: channels that stand still in space may have to."""
@@ -186,8 +170,8 @@ class Search(Problem):
             for bound in requirements.bounds(self.spacecraft)
             if bound.part is not Part.SPIN
         )
-        near = [each for each in self.candidates if each.error <= NEARLY * tightest]
-        return min(near, key=lambda each: each.price).schedule if near else None
+        near = [each for each in self.tried if self.error(each) <= NEARLY * tightest]
+        return min(near, key=self.rank, default=None)
 
     def task(self) -> Task:
         """Task of the descents."""
@@ -200,11 +184,11 @@ class Search(Problem):
         aside = np.array([0.0, 0.0, *off, 0.0])[self.equations.chosen]
         return Refinement(flight, self.equations, aside, self.flown).refined()
 
-    def corrected(self, program: Program, solution: Solution) -> list[Candidate]:
+    def corrected(self, program: Program, solution: Solution) -> list[Schedule]:
         """Schedules from the burns of a solution, corrected along one flight after the other,
         unless they get lost.
         """
-        candidates: list[Candidate] = []
+        schedules: list[Schedule] = []
         last = math.inf
         for turn in range(AIMS):
             if solution.unmet > LOST or not solution.burns or work.exhausted():
@@ -217,16 +201,15 @@ class Search(Problem):
             program.aim(along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
                 schedule = self.refined(flown, solution.off)
-                candidate = self.candidate(self.flown(schedule), self.price(schedule))
-                candidates.append(candidate)
-                price = candidate.price if candidate.error == 0.0 else math.inf
+                schedules.append(schedule)
+                price = self.price(schedule) if self.error(schedule) == 0.0 else math.inf
                 if math.isfinite(price) and (
                     not self.dear(schedule, DEAR) or price > (1.0 - SETTLED) * last
                 ):
                     break
                 last = price
             solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
-        return candidates
+        return schedules
 
     def lowered(self, schedule: Schedule | None) -> Schedule | None:
         """The schedule after some steps down on the true motion, where that is known in closed form
@@ -280,7 +263,7 @@ def by_program(search: Search, _: Schedule | None) -> Schedule | None:
     program = search.program()
     program.haste = HASTE
     fewest = search.options.least == "pulses"
-    candidates: list[Candidate] = []
+    schedules: list[Schedule] = []
     for _choice in range(CHOICES):
         if work.exhausted():
             break
@@ -288,12 +271,11 @@ def by_program(search: Search, _: Schedule | None) -> Schedule | None:
         if solution.unmet > UNMET:
             break
         burns = thinned(program, solution, search.first.cost, fewest=fewest)
-        candidates += search.corrected(program, burns)
-        if not candidates or any(
-            each.error == 0.0 and not search.dear(each.schedule, DEAR) for each in candidates
-        ):
+        schedules += search.corrected(program, burns)
+        cheap = (not search.dear(each, DEAR) and search.error(each) == 0.0 for each in schedules)
+        if not schedules or any(cheap):
             break
-    return search.best(candidates)
+    return search.best(schedules)
 
 
 def by_shorter_programs(search: Search, best: Schedule | None) -> Schedule | None:
@@ -324,17 +306,17 @@ def by_other_schemes(search: Search, _: Schedule | None) -> Schedule | None:
         if work.exhausted() or (exact and not search.dear(schedule, DEAR)):
             break
     names = {channel.name: channel for channel in search.channels}
-    candidates: list[Candidate] = []
+    schedules: list[Schedule] = []
     flights.sort(key=lambda flight: (search.left(flight) > LEFT, search.price(flight.schedule)))
     for flight in flights[:WAYS]:
-        candidates.append(search.candidate(flight, search.price(flight.schedule)))
+        schedules.append(flight.schedule)
         if work.exhausted():
             continue
         program = search.program()
         program.aim(along(flight, search.equations, program.width))
         burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in flight.schedule]
-        candidates += search.corrected(program, program.solve(program.about(burns)))
-    return search.best(candidates)
+        schedules += search.corrected(program, program.solve(program.about(burns)))
+    return search.best(schedules)
 
 
 def by_descent(search: Search, best: Schedule | None) -> Schedule | None:
@@ -356,38 +338,16 @@ def by_descent(search: Search, best: Schedule | None) -> Schedule | None:
     if not doubtful:
         return search.lowered(best)
     every = multistart.schedules(task, () if best is None else (best,))
+    schedules = [each for each in every if keeps_limits(spacecraft, each.pulses)]
     if spacecraft.limits.tick is not None:
-        every = [on_ticks(search, schedule) for schedule in every[:WAYS]]
-    candidates = [
-        search.candidate(search.flown(schedule), search.worth(schedule))
-        for schedule in every
-        if keeps_limits(spacecraft, schedule.pulses)
-    ]
-    return search.best(candidates)
-
-
-def on_ticks(search: Search, schedule: Schedule) -> Schedule:
-    """An exact schedule on the ticks of the commands."""
-    flight = search.flown(schedule)
-    loose = search.options.shift is not None
-    return search.refined(flight, misses(flight, search.equations)[2:4] if loose else np.zeros(2))
-
-
-def by_more_pulses(search: Search, best: Schedule | None) -> Schedule | None:
-    """From the longest burns of the program, `FEW` for each equation, where the best has fewer."""
-    few = FEW * len(search.equations.chosen)
-    if best is None or len(best) >= few or search.options.least == "pulses":
-        return None
-    program = search.program()
-    program.haste = HASTE
-    longest = sorted(program.solve().burns, key=lambda burn: -burn.impulse)[:few]
-    if len(longest) <= len(best) or work.exhausted():
-        return None
-    corrected = search.corrected(program, program.solve(program.about(longest)))
-    more = search.lowered(search.best(corrected))
-    if more is None or search.price(best) <= search.price(more) * (1.0 + SAVED):
-        return None
-    return more
+        schedules = []
+        for flight in map(search.flown, every[:WAYS]):
+            off = misses(flight, search.equations)[2:4]
+            loose = search.options.shift is not None
+            rounded = search.refined(flight, off if loose else np.zeros(2))
+            if keeps_limits(spacecraft, rounded.pulses):
+                schedules.append(rounded)
+    return search.best(schedules)
 
 
 def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
@@ -638,7 +598,7 @@ def hastened(search: Search, best: Schedule) -> Schedule:
     By how much earlier an end may be small angles tell; the horizons that are tried lie a little
     later.
     """
-    if search.options.least not in ("propellant", "impulse") or search.first.unmet > UNMET:
+    if not search.options.saves_cost or search.first.unmet > UNMET:
         return best
     dearest = search.price(best) * (1.0 + SAME_COST)
     allowed = max(search.price(best), search.first.cost) * (1.0 + ABOUT)
