@@ -61,6 +61,7 @@ BEAM = 32  # sequences that are continued, by each merit
 COARSE = 300  # cheapest sequences that are continued where delays are few: as in cb5030
 DOUBTFUL = 1.5  # share of a bound up to which the closed form may err
 FLOWN = 64  # sequences that are flown together, by each merit
+FIRST = 12  # sequences that are flown first
 BATCHES = 16  # multiple of `FLOWN` of doubtful sequences that are flown, the cheapest first
 FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
 # multiple of the least cost above which further blocks are looked for though one complies
@@ -533,47 +534,44 @@ class BlockSearch:
     # --- flights
 
     def fly(self, sequences: BlockSequences) -> None:
-        """Fly what is promising: where the search is whole all that may comply, the cheapest first.
+        """Fly what is promising, batch by batch, as long as it may cost less than what complies:
+        where the search is whole all that may comply, the cheapest first.
 
         Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest
-        of many may not.
+        of many may not. Where the closed form errs by much, the cheapest that comply are far
+        behind.
         """
         share, cost = sequences.share, sequences.cost
-        ranked = sequences.ranked
-        clear = np.argsort(share, kind="stable")
-        if self.whole:
-            order = np.lexsort((share, cost, share > DOUBTFUL))
-            order = order[: max(int(np.sum(share <= DOUBTFUL)), 8 * FLOWN)]
-            for begin in range(0, len(order), 8 * FLOWN):
-                some = order[begin : begin + 8 * FLOWN]
-                if cost[some[0]] >= self.flights.cheapest * (1.0 - SAME_COST) or work.exhausted():
-                    break
-                self._fly(sequences, some)
-            return
-        self._fly(sequences, np.unique(np.concatenate([ranked[:8], clear[:4]])))
-        if work.exhausted():
-            return
         doubtful = np.lexsort((share, cost, share > DOUBTFUL))
-        largest = np.zeros(len(share))
-        for kind, (channel, _) in enumerate(self.kinds):
-            of_kind = np.flatnonzero(sequences.kind == kind)
-            turns = self.model.turned_by(channel, sequences.width[of_kind], self.spacecraft.spin)
-            largest[of_kind] = turns
-        some = clear[: 8 * FLOWN]
-        gentle = some[np.argsort(largest[some], kind="stable")]
-        mixed = np.array([each[:FLOWN] for each in (ranked, clear, gentle, doubtful)]).T.ravel()
-        _, index = np.unique(mixed, return_index=True)
-        rows = mixed[np.sort(index)]
-        self._fly(sequences, rows[cost[rows] < self.flights.cheapest * (1.0 - SAME_COST)])
-        # Where the closed form errs by much, the cheapest that comply are far behind.
-        doubtful = doubtful[FLOWN : BATCHES * FLOWN]
-        doubtful = doubtful[share[doubtful] <= DOUBTFUL]
-        for begin in range(0, len(doubtful), 2 * FLOWN):
-            some = doubtful[begin : begin + 2 * FLOWN]
-            some = some[cost[some] < self.flights.cheapest * (1.0 - SAME_COST)]
-            if not len(some) or work.exhausted():
+        some = int(np.sum(share <= DOUBTFUL))
+        if self.whole:
+            order = doubtful[: max(some, 8 * FLOWN)]
+        else:
+            largest = np.zeros(len(share))
+            for kind, (channel, _) in enumerate(self.kinds):
+                rows = np.flatnonzero(sequences.kind == kind)
+                turns = self.model.turned_by(channel, sequences.width[rows], self.spacecraft.spin)
+                largest[rows] = turns
+            clear = np.argsort(share, kind="stable")
+            gentle = clear[: 8 * FLOWN]
+            gentle = gentle[np.argsort(largest[gentle], kind="stable")]
+            ranked = sequences.ranked
+            mixed = np.array([each[:FLOWN] for each in (ranked, clear, gentle, doubtful)]).T.ravel()
+            rest = doubtful[FLOWN : min(BATCHES * FLOWN, some)]
+            order = np.concatenate([ranked[:8], clear[:4], mixed, rest])
+            order = order[np.sort(np.unique(order, return_index=True)[1])]
+        begin = 0
+        # A few at first: those of the others that cost more than one that complies are not flown.
+        size = 8 * FLOWN if self.whole else FIRST
+        while begin < len(order) and not (begin and work.exhausted()):
+            batch = order[begin : begin + size]
+            batch = batch[cost[batch] < self.flights.cheapest * (1.0 - SAME_COST)]
+            if len(batch):
+                self._fly(sequences, batch)
+            elif self.whole:
                 break
-            self._fly(sequences, some)
+            begin += size
+            size = 4 * FLOWN
 
     def _fly(self, sequences: BlockSequences, rows: Index) -> Index:
         """Fly rows, and return those that were: the first ones, if all have too many pulses."""

@@ -134,7 +134,18 @@ def model_of(
     ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle
     may be of any size. ``three_moments``: the model has those of the spacecraft.
     """
-    undisturbed = _without_steady(spacecraft)
+    undisturbed = spacecraft
+    if spacecraft.disturbances:  # ω counts from the steady response to those that last
+        steady = steady_omega(spacecraft, 0.0)
+        beaten = (
+            replace(each, transverse=0j) if settles(spacecraft, each) else each
+            for each in spacecraft.disturbances
+        )
+        undisturbed = replace(
+            spacecraft,
+            omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
+            disturbances=tuple(each for each in beaten if each.axial or each.transverse),
+        )
     inertia = spacecraft.inertia
     if inertia.symmetric or three_moments:
         return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
@@ -191,26 +202,6 @@ def _aimed(symmetric: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
     middle = (before + after) / float(np.linalg.norm(before + after))
     axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
     return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
-
-
-def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
-    """Spacecraft with ω counted from the steady response to its disturbances; those without one
-    stay.
-    """
-    if not spacecraft.disturbances:
-        return spacecraft
-    steady = steady_omega(spacecraft, 0.0)
-    left = (
-        replace(each, transverse=0j) if settles(spacecraft, each) else each
-        for each in spacecraft.disturbances
-    )
-    return replace(
-        spacecraft,
-        omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
-        disturbances=tuple(
-            disturbance for disturbance in left if disturbance.axial or disturbance.transverse
-        ),
-    )
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:

@@ -371,21 +371,30 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
             schedule = None if work.exhausted() else attempt(limited)
             if schedule is not None:
                 return Cure(name, f"without {name} there is a schedule of {len(schedule)} pulses")
-        low = high = spacecraft.horizon
-        latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
-        while high < latest and not work.exhausted():
-            low, high = high, float(f"{2.0 * high:.4g}")
-            if attempt(with_limits(spacecraft, horizon=high)) is None:
-                continue
-            for _ in range(BISECTIONS):
-                middle = float(f"{0.5 * (low + high):.4g}")
-                enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
-                low, high = (low, middle) if enough else (middle, high)
-            return Cure("horizon", f"limits.horizon = {high:.4g} s is long enough")
-        if work.exhausted():
-            return Cure("", "")
-    none = f"no single limit is the cause, and {LATEST:g} times the horizon does not help either"
-    return Cure("", none)
+        cure = longer_horizon(spacecraft, attempt)
+    if cure.limit or not cure.text:
+        return cure
+    return Cure("", f"no single limit is the cause, and {cure.text}")
+
+
+def longer_horizon(
+    spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
+) -> Cure:
+    """Cure of an ``attempt`` by a longer horizon, as in `why`."""
+    low = high = spacecraft.horizon
+    latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
+    while high < latest and not work.exhausted():
+        low, high = high, float(f"{2.0 * high:.4g}")
+        if attempt(with_limits(spacecraft, horizon=high)) is None:
+            continue
+        for _ in range(BISECTIONS):
+            middle = float(f"{0.5 * (low + high):.4g}")
+            enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
+            low, high = (low, middle) if enough else (middle, high)
+        return Cure("horizon", f"limits.horizon = {high:.4g} s is long enough")
+    return Cure(
+        "", "" if work.exhausted() else f"{LATEST:g} times the horizon does not help either"
+    )
 
 
 NO_AXIAL = "no channel has a torque about axis 3, so no channel can set the spin; leave out --spin"

@@ -70,7 +70,7 @@ def settle(
         return attempt
 
     monkeypatch.setattr(optimal, "by_program", by_program)
-    for name, made in ({"by_descent": None} | others).items():
+    for name, made in ({"by_descent": None, "by_more_pulses": None} | others).items():
         monkeypatch.setattr(optimal, name, gives(made))
     return tried
 
