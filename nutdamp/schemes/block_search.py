@@ -52,7 +52,6 @@ BESIDE = 0.01
 FIRST_PAIRS, PAIRS = 256, 16
 """Pairs of width and number that are looked at by each merit, for the first block and others."""
 GENTLE = 4  # pulses of a block that is gentle
-WIDTHS = 24  # widths near that of a flown block that are looked at
 PHASED, PHASES = 4, 12
 """Cheapest pairs that are looked at not only where they damp most, but at as many delays: the next
 block takes what they leave only if its pulse is as large as that.
@@ -66,8 +65,6 @@ BATCHES = 16  # multiple of `FLOWN` of doubtful sequences that are flown, the ch
 FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
 # multiple of the least cost above which further blocks are looked for though one complies
 DEAR = 1.5
-NEIGHBOURS = 12  # flights near which others are looked for
-ROUNDS = 4  # searches near the best flights, where none complies
 CHUNK = 200_000  # trials whose motion is computed at once: arrays that the caches hold
 LOOKED = 1e-6  # units of `work` of a block that is looked at
 
@@ -129,14 +126,6 @@ class BlockSearch:
                 break
             beam = sequences if self.whole else self.beam(sequences)
             if not len(beam.share):
-                break
-        for _ in range(ROUNDS):
-            if not self.flights.of or math.isfinite(self.flights.cheapest) or work.exhausted():
-                break
-            flown = len(self.flights.of)
-            for sequences in self.neighbours():
-                self.fly(sequences)
-            if len(self.flights.of) == flown:
                 break
 
     @property
@@ -232,8 +221,6 @@ class BlockSearch:
         else:
             few = FIRST_PAIRS if first else PAIRS
             chosen = self._by_merits(before.state, kind, (width, count), misses, few)
-            if not last:
-                chosen[:, self._part_way(before.state, kind, width, count)] = True
         at = np.nonzero(chosen)
         return rows[at[0]], width[at[1]], count[at[1]]
 
@@ -265,23 +252,6 @@ class BlockSearch:
         chosen[rows, gentle[least(damped, few)]] = True
         chosen[:, evenly(gentle, few)] = True
         return chosen
-
-    def _part_way(self, state: BlockState, kind: int, width: Array, count: Index) -> Index:
-        """Pairs of three widths that go a part of the way to the target, or end at a blackout."""
-        channel, every = self.kinds[kind]
-        if self.spacecraft.goal.axis is None or not channel.transverse:
-            return np.zeros(0, dtype=np.intp)
-        way = float(np.max(self.model.course(state)[1]))
-        rows = list[Index]()
-        for size in evenly(self.widths[kind], 3).tolist():
-            step = float(self.model.turned_by(channel, size, self.spacecraft.spin))
-            numbers = [*np.linspace(0.0, 1.0, 13)[1:] * way / step]
-            to_dark = (self.dark[0][:WINDOWS] - float(np.min(state.sun_pulse))) / self.model.turn
-            numbers += [*np.floor(to_dark / every), *np.floor(to_dark / every) + 1.0]
-            at = np.flatnonzero(width == size)
-            nearest = np.abs(count[at][:, None] - np.clip(numbers, 1.0, count.max())).argmin(axis=0)
-            rows.append(at[nearest])
-        return np.unique(np.concatenate(rows))
 
     def beam(self, sequences: BlockSequences) -> BlockSequences:
         """The promising sequences, with the motion of their flights."""
@@ -348,13 +318,11 @@ class BlockSearch:
         *,
         last: bool,
         delays: Array | None = None,
-        off: BlockState | None = None,
     ) -> Iterator[BlockSequences]:
         """Blocks of ``pairs`` behind the rows ``before``, after ``waits``: of each pair the best
         two, or in whole searches all that may be of use.
 
-        ``delays`` s: default those that serve best. ``off``: by how much they end elsewhere than
-        the closed form says.
+        ``delays`` s: default those that serve best.
         """
         channel, every = self.kinds[kind]
         size = len(waits) * (self.last_delay + 1 if self.whole else 4)
@@ -366,7 +334,7 @@ class BlockSearch:
             best = self.delays(state, channel, trial) if delays is None else delays
             trial = trial._replace(delay=best)
             after = self.model.after(state, channel, trial)
-            residual = self.model.left(after if off is None else after.shifted(off))
+            residual = self.model.left(after)
             share = self.flights.share(residual)
             shape = np.broadcast_shapes((len(rows), len(waits), 1), np.shape(share))
             work.spend(LOOKED * math.prod(shape))
@@ -571,7 +539,7 @@ class BlockSearch:
             elif self.whole:
                 break
             begin += size
-            size = 4 * FLOWN
+            size = 2 * FLOWN
 
     def _fly(self, sequences: BlockSequences, rows: Index) -> Index:
         """Fly rows, and return those that were: the first ones, if all have too many pulses."""
@@ -601,39 +569,3 @@ class BlockSearch:
             angle,
         )
         return (*self.blocks(sequences.before, int(sequences.parent[row])), block)
-
-    def neighbours(self) -> list[BlockSequences]:
-        """Blocks about as long and as late as those of the best flights, where the closed form errs
-        as it does for these.
-        """
-        channels = dict[tuple[str, ...], Blocks]()
-        for blocks in sorted(self.flights.of, key=lambda blocks: self.flights.of[blocks].rank):
-            channels.setdefault(tuple(block.channel for block in blocks), blocks)
-        near = list[BlockSequences]()
-        for blocks in list(channels.values())[:NEIGHBOURS]:
-            sequences, row = self.rows[blocks]
-            before, block = sequences.before, blocks[-1]
-            assert before is not None
-            kind, parent = int(sequences.kind[row]), sequences.parent[[row]]
-            end = self.flights.of[blocks].end[:, None]
-            off = self.model.apart(sequences.state.some(row), end)
-            channel = self.kinds[kind][0]
-            widths = self.widths[kind]
-            at = int(np.argmin(np.abs(widths - block.width)))
-            edges = widths[max(at - 3, 0)] - 1e-12, widths[min(at + 3, len(widths) - 1)] + 1e-12
-            closer = commandable_widths(self.commands, channel, *edges, count=WIDTHS)
-            widths = np.union1d(evenly(widths, WIDTHS), closer)
-            on_time = acts(channel, np.array([block.width])).on_time
-            counts = np.rint(block.count * on_time / acts(channel, widths).on_time)
-            counts = (counts[:, None] + np.arange(-2, 3)).clip(1, self.allowed).astype(int)
-            width = np.broadcast_to(widths[:, None], counts.shape).ravel()
-            pairs = np.repeat(parent, width.size), width, counts.ravel()
-            waits = np.arange(-1, 2) + block.first - self._following(before, parent)
-            waits = waits[waits >= (self.earliest if before.before is None else self.pause)]
-            delay = block.delay_at(self.spacecraft.spin)
-            delays = delay + np.arange(-3, 4) * self.commands.delay_step
-            parts = self.behind(
-                before, kind, pairs, waits, last=True, delays=self.commanded(delays), off=off
-            )
-            near.append(joined(before, list(parts)))
-        return near

@@ -502,7 +502,7 @@ def test_blocks_that_miss_say_what_would_help(
 
 
 @pytest.mark.parametrize("step", ["10 ms", "1e-9 s", "1e-13 s"])
-def test_fine_steps_are_never_listed_and_neighbours_of_the_best_are_looked_at(step: str) -> None:
+def test_fine_steps_are_never_listed(step: str) -> None:
     """10 ms from 100 to 500 ms: 41 widths, all of them; else some that lie on the grid, with both
     ends.
     """
