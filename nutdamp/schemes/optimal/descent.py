@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
+from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude
 from nutdamp.physics.motion import BLOCK, MotionStretch, advance
@@ -35,6 +36,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 LEAST_ROOM = 1e-10  # share of the room to a bound that a step must leave
 
 Indices = NDArray[np.int_]
+Complex = NDArray[np.complex128]
 
 DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
 FLIGHT, CASE = (
@@ -117,7 +119,8 @@ class Task:
         if ideal and self._linear is not None:
             return self._at_small_angles(self._linear, which, x)
         parts = [slice(begin, begin + BLOCK) for begin in range(0, max(count, 1), BLOCK)]
-        flown = [self._flown(which[part], x[part], ideal) for part in parts]
+        fly = self._together if self._arcs else self._in_turn
+        flown = [fly(which[part], x[part], ideal) for part in parts]
         momentum, turn = (np.concatenate(part, axis=1) for part in zip(*flown, strict=True))
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
@@ -137,17 +140,17 @@ class Task:
         on = x[:, n : 2 * n]
         rows = linear.rows((x[:, :n] + 0.5 * on).ravel()) * linear.widths(on.ravel())[:, :, None]
         impulses = self.torques[which] * on[:, :, None]
-        left = np.einsum("bnek,bnk->be", rows.reshape(*which.shape, -1, 3), impulses) - linear.goal
+        shape = (*which.shape, len(self.chosen), 3)
+        left = np.einsum("bnek,bnk->be", rows.reshape(shape), impulses) - linear.goal
         if self.loose:
             left[:, 2:4] -= self.off * x[:, -2:]
         return np.asarray(left / self.momentum)
 
-    def _flown(self, which: Indices, x: Vector, ideal: bool) -> tuple[Vector, Vector]:
+    def _in_turn(self, which: Indices, x: Vector, ideal: bool) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
-        if not self._arcs:
-            turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1], initial=0.0)) * self._pace
-            work.spend(turned * (RADIAN + CASE_RADIAN * count))
+        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1], initial=0.0)) * self._pace
+        work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
         bodies = Bodies(moments, *(self._coasting if ideal else self._forced))
         now = np.zeros(count)
@@ -164,6 +167,76 @@ class Task:
                 advance(MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
         return bodies.momentum(rates), turn
+
+    def _together(self, which: Indices, x: Vector, ideal: bool) -> tuple[Vector, Vector]:
+        """`_in_turn` of a body without external torque, all stretches at once."""
+        # In the frame that turns with the nutation pulses add to H whatever it is, and between them
+        # the body turns about H and its own axis: so the motion at all edges is known first, and
+        # then all turns are. A quaternion is a pair of complex numbers, w + iz and x + iy.
+        count, n = which.shape
+        (A, _, C), rates, turn = self._start
+        wheel = self.spacecraft.inertia.wheel
+        starts, widths = x[:, :n], x[:, n : 2 * n]
+        impulses = self.torques[which] * widths[:, :, None]
+        if ideal:
+            starts, widths = starts + 0.5 * widths, np.zeros_like(widths)
+        coasts = np.diff(starts, axis=1, prepend=0.0)
+        coasts[:, 1:] -= widths[:, :-1]
+        axial = C * rates[2] + wheel + np.cumsum(impulses[:, :, 2], axis=1)
+        before, pace = axial - impulses[:, :, 2], 1.0 / C - 1.0 / A
+        turned = (pace * before - wheel / C) * coasts
+        within = (pace * (before + 0.5 * impulses[:, :, 2]) - wheel / C) * widths
+        phase = np.cumsum(turned + within, axis=1)
+        begun = np.exp(1j * (phase - within))  # as each pulse begins
+        added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
+        if not ideal and self.torques[:, 2].any():
+            added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(
+                1j * within
+            )
+        elif not ideal:
+            added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
+        after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
+        across = (
+            after - added * begun
+        ) / begun  # in body axes as each pulse begins: H turns back in a coast
+        size = np.sqrt(across.real**2 + across.imag**2 + before**2)
+        cosine, sine = cos_sin(0.5 / A * size * coasts)
+        sine /= np.where(size > 0.0, size, 1.0)
+        half = np.exp(0.5j * turned)
+        first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
+        if not ideal:
+            turns = zip(
+                (first, second), self._pulsed(which, across, before, widths)[1:], strict=True
+            )
+            first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
+        first, second = _product(first, second)
+        momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
+        spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
+        return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
+
+    def _pulsed(
+        self, which: Indices, across: Complex, before: Vector, widths: Vector
+    ) -> tuple[Complex, ...]:
+        """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along
+        it; turn of each.
+        """
+        count = which.size
+        moments = np.repeat(self._start[0][:, None], count, axis=1)
+        rates = (
+            np.array([across.real, across.imag, before - self.spacecraft.inertia.wheel]).reshape(
+                3, -1
+            )
+            / moments
+        )
+        turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
+        bodies = Bodies(moments, *self._coasting)
+        stretch = MotionStretch(
+            bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T
+        )
+        advance(stretch, widths.ravel())
+        pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
+        after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
+        return after * self._start[0][0], *turned
 
     def slopes(
         self, which: Indices, x: Vector, scale: Vector, here: Vector, *, ideal: bool
@@ -212,6 +285,20 @@ class Task:
             matrix = np.vstack([np.pad(matrix, ((0, 0), (0, 2))), sides])
             levels.append(np.full((count, len(sides)), -math.cos(math.pi / len(sides))))
         return matrix, np.hstack(levels)
+
+
+def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
+    """Product (b,) of quaternions (b, n) in their order, each a pair of complex numbers as in
+    `Task`.
+    """
+    while (count := first.shape[1]) > 1:
+        last = count & ~1
+        u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
+        products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
+        first, second = (
+            np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products
+        )
+    return first[:, 0], second[:, 0]
 
 
 WHOLE, SHARES = (

@@ -17,11 +17,13 @@ from support.checker import violations
 from support.commands import rows as rows_of
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
+from support.rivals import unequal_body
 
 import nutdamp
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
+from nutdamp.physics import attitude
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes import correction, two_pulse
@@ -40,6 +42,7 @@ from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.optimal.search import DEARER, HALVINGS, Search, by_program
 from nutdamp.schemes.sequential import at_hand, bounded_by
 from nutdamp.spacecraft.constraints import keeps_limits
+from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -594,3 +597,33 @@ def test_no_schedule_ends_earlier(seed: int) -> None:
     assert made.feasible
     assert Outcome(body, made.pulses).nutation < 1e-9
     assert made.end < 1.03 * least_end(body)
+
+
+# --- flights of many sequences at once: all stretches together are what they are in turn
+
+LEANING = (*cross(8.0), channel("lean", 3.0, 4.0, 1.5))
+"""Channels of which one changes the spin."""
+
+
+@pytest.mark.parametrize("channels", [cross(8.0), LEANING])
+@pytest.mark.parametrize("ideal", [False, True])
+def test_all_stretches_at_once_are_those_in_turn(
+    channels: tuple[Channel, ...], ideal: bool
+) -> None:
+    task = Task(spinner(channels=channels), EndEquations(), channels, np.ones(len(channels)))
+    draw = np.random.default_rng(1)
+    which = draw.integers(len(channels), size=(9, 5))
+    x = np.hstack(
+        [3.0 * np.arange(5) + draw.uniform(0.0, 1.0, (9, 5)), draw.uniform(0.0, 1.8, (9, 5))]
+    )
+    (momentum, turn), (expected, turned) = (
+        task._together(which, x, ideal),
+        task._in_turn(which, x, ideal),
+    )
+    size = np.abs(expected).max()
+    assert np.abs(momentum - expected).max() < 1e-13 * size
+    there, here = (attitude.rotate(q.T, h.T) for q, h in ((turn, momentum), (turned, expected)))
+    assert np.abs(there - here).max() < 1e-13 * size
+    unequal = Task(unequal_body(1)[0], EndEquations(), channels, np.ones(len(channels)))
+    for each in (task, unequal):
+        assert each.misses(which[:0], x[:0], ideal=ideal).shape == (0, len(EndEquations().chosen))
