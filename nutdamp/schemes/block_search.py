@@ -49,13 +49,12 @@ WINDOWS = 8
 # share of a spin turn by which blocks in closed form keep away from blackout windows: nutation
 # moves Sun pulses
 BESIDE = 0.01
+# Pairs of width and number that are looked at by each merit, for the first block and others.
 FIRST_PAIRS, PAIRS = 256, 16
-"""Pairs of width and number that are looked at by each merit, for the first block and others."""
 GENTLE = 4  # pulses of a block that is gentle
+# Cheapest pairs that are looked at not only where they damp most, but at as many delays: the next
+# block takes what they leave only if its pulse is as large as that.
 PHASED, PHASES = 4, 12
-"""Cheapest pairs that are looked at not only where they damp most, but at as many delays: the next
-block takes what they leave only if its pulse is as large as that.
-"""
 BEAM = 32  # sequences that are continued, by each merit
 COARSE = 300  # cheapest sequences that are continued where delays are few: as in cb5030
 DOUBTFUL = 1.5  # share of a bound up to which the closed form may err

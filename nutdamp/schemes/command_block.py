@@ -280,10 +280,9 @@ def opposite_blocks(spacecraft: Spacecraft, most: int | None) -> FlownSequence |
 
 LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twice
 
+# Share of a bound that the turn may use up before the spin is changed, and the inverse for what
+# that may add.
 MARGIN = 0.97
-"""Share of a bound that the turn may use up before the spin is changed, and the inverse for what
-that may add.
-"""
 
 
 def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:

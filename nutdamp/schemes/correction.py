@@ -64,19 +64,17 @@ ALIGNED = 1e-9
 # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
 FADED = 1e-6
 
+# Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
+# given length so many before the equal ones, which damp the nutation, and at the end.
 MOVED, BEFORE, AFTER = 8, 12, 24
-"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
-given length so many before the equal ones, which damp the nutation, and at the end.
-"""
 
 EXACT = (
     1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
 )
 
+# Factors of cost and miss within which candidates count as equal: of those the one that ends first
+# is preferred.
 CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
-"""Factors of cost and miss within which candidates count as equal: of those the one that ends first
-is preferred.
-"""
 
 
 @dataclass(frozen=True, eq=False)

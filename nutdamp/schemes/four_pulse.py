@@ -29,11 +29,10 @@ FILLED = 0.5
 MOST_FLOWN = 200  # pulses that are laid one by one on the true motion, at most
 
 
+# End of a schedule without the channels that waste, over that with all, up to which it is taken
+# where values are dispersed: errors of the moments of inertia grow with time. At 1.44 times 81 % of
+# the cases complied in place of 91 %, at 2.3 times 95 % in place of all.
 LATER = 1.25
-"""End of a schedule without the channels that waste, over that with all, up to which it is taken
-where values are dispersed: errors of the moments of inertia grow with time. At 1.44 times 81 % of
-the cases complied in place of 91 %, at 2.3 times 95 % in place of all.
-"""
 
 
 def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:

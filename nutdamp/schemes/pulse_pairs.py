@@ -301,10 +301,8 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
 
 DEAREST = 3.0  # pairs that cost more than this times the floor are not looked at
 
+# Moments looked at in each turn of the body, and turns within which the first pulse comes, at most.
 BODY_SAMPLES, BODY_TURNS = 96, 24
-"""Moments looked at in each turn of the body, and turns within which the first pulse comes, at
-most.
-"""
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:

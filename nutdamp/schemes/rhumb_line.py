@@ -54,10 +54,9 @@ OTHERS = 4  # other lengths of the pulses that are tried where the one requested
 
 STEP = math.radians(2.0)  # angle that one ideal impulse turns H by, at most
 
+# Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that
+# has no hope.
 CLOSED, OPEN = 0.3, 1.2
-"""Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that
-has no hope.
-"""
 
 MOST_PULSES = 600
 
@@ -431,8 +430,8 @@ def _ratio(whole: float, part: float) -> float:
     return whole / part if whole < 1e9 * part else 1e9
 
 
+# rad of flown residual that count as nothing, and relative saving that is worth more pulses.
 EXACT, CLEARLY = 1e-10, 0.01
-"""rad of flown residual that count as nothing, and relative saving that is worth more pulses."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:

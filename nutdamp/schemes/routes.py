@@ -23,18 +23,16 @@ from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
+# rad by which a route keeps clear of the cones.
 MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
-"""rad by which a route keeps clear of the cones."""
 
+# rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest
+# first.
 BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sign in (1.0, -1.0))
-"""rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest
-first.
-"""
 
+# Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of
+# parts of each leg.
 PLACES, PARTS = ((), (0.5,), (0.25, 0.75)), (1, 2, 4)
-"""Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of
-parts of each leg.
-"""
 
 ROUTES = 16  # routes that are tried, at most
 STEPS = 64  # points of a leg at which the cones are looked at

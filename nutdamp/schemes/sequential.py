@@ -30,10 +30,9 @@ MISSED = 50
 # only
 CORRECTED = 1e-4
 
+# Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be
+# planned and flown.
 MOST_PULSES = 2000
-"""Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be
-planned and flown.
-"""
 
 
 class ImpulseBuilder:
@@ -336,14 +335,13 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     return listed([name for name in there if there[name]])
 
 
+# Multiple of the horizon up to which a sufficient one is sought, where the default one is not
+# longer; halvings of the last doubling: the one that is named is at most an eighth of it too long.
 LATEST, BISECTIONS = 64.0, 3
-"""Multiple of the horizon up to which a sufficient one is sought, where the default one is not
-longer; halvings of the last doubling: the one that is named is at most an eighth of it too long.
-"""
 
 FREE_LIMITS = {"earliest": 0.0, "blackout": (), "gap": 0.0, "tick": None, "max_pulses": None}
+# Keys of limits of a file and of its thrusters, with the values that limit nothing.
 FREE_ON_TIMES = {"min_on_time": 0.0, "max_on_time": math.inf}
-"""Keys of limits of a file and of its thrusters, with the values that limit nothing."""
 
 
 class Cure(NamedTuple):
@@ -397,8 +395,8 @@ def longer_horizon(
     )
 
 
+# Reason why a final spin cannot be had.
 NO_AXIAL = "no channel has a torque about axis 3, so no channel can set the spin; leave out --spin"
-"""Reason why a final spin cannot be had."""
 
 
 def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:

@@ -13,7 +13,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,23 +165,13 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
-HALVINGS = 10
+# Shares added to the earliest end by small angles that are tried in turn.
 LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
-"""Steps in which the earliest end by small angles is found, and shares added to it that are tried
-in turn.
-"""
 
 
-class Pieces(NamedTuple):
-    """Numbers ``which`` (n,) of channels that fire one after the other, -1 where none does, and for
-    how long, s.
-
-    ``off`` (2,) N m s is how far from the target H is to end, where it may.
-    """
-
-    which: NDArray[np.int_]
-    times: Vector
-    off: Vector
+# Numbers (n,) of channels that fire one after the other, -1 where none does; for how long, (n,) s;
+# how far from the target H is to end, where it may, (2,) N m s.
+Pieces = tuple[NDArray[np.int_], Vector, Vector]
 
 
 def earliest(problem: Problem) -> Schedule | None:
@@ -190,17 +180,16 @@ def earliest(problem: Problem) -> Schedule | None:
     """
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
     influence = small_angles(problem.spacecraft, problem.equations)
-    if _pieces(problem, influence, horizon) is None:
+
+    def possible(end: float) -> bool:
+        return not work.exhausted() and _pieces(problem, influence, end) is not None
+
+    if not possible(horizon):
         return None
-    low, high = begin, horizon
-    for _ in range(HALVINGS):
-        if work.exhausted():
-            return None
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if _pieces(problem, influence, middle) else (middle, high)
+    high = problem.least_horizon(begin, horizon, feasible=possible)
     for share in LONGER:
         end = min(high + share * (high - begin), horizon)
-        schedule = within(problem, end)
+        schedule = None if work.exhausted() else within(problem, end)
         if schedule is not None or end == horizon or work.exhausted():
             return schedule
     return None
@@ -227,7 +216,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        burns = _burns(problem, pieces.which, pieces.times)
+        burns = _burns(problem, *pieces[:2])
         influence = along(problem.flown(burns), problem.equations, _slot(problem))
     return None
 
@@ -309,7 +298,7 @@ def _in_order(times: Vector, width: float, off: Vector) -> Pieces | None:
     if joined[-1][0] < 0:
         joined.pop()
     which, lengths = (np.array([part[at] for part in joined]) for at in (0, 1))
-    return Pieces(which, lengths, off) if joined else None
+    return (which, lengths, off) if joined else None
 
 
 def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:

@@ -33,10 +33,9 @@ from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_puls
 UNMET = 1e-7
 REPAIRS = 60  # rounds in which burns that break a limit are moved elsewhere
 
+# Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth a
+# search.
 THRIFT, GAIN = 0.004, 0.0005
-"""Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth
-a search.
-"""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
@@ -175,8 +174,8 @@ LEFT = math.radians(1e-5)
 # share by which a schedule costs less than the bound of small angles, that refutes the bound
 BEATEN = 0.005
 
+# Relative accuracy of a least time by small angles.
 SHARPEST = 1e-3
-"""Relative accuracy of a least time by small angles."""
 
 
 class Problem:

@@ -30,19 +30,18 @@ from nutdamp.spacecraft.constraints import Windows, longest_on_time, rooms
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 
+# Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still
+# resolves) is left of the nutation, or all is lost; even moments, besides the edges of pulses, at
+# which ω3 is read from a flight with it.
 MOST_GROWN, KNOTS = 14.0, 400
-"""Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still
-resolves) is left of the nutation, or all is lost; even moments, besides the edges of pulses, at
-which ω3 is read from a flight with it.
-"""
 
 # Steps in a turn by which small changes of a motion of three moments are followed, terms of each
 # one's exponential, the most steps, and units of `work` of each.
 STEPS, ORDERS, MOST_VARIED, VARIED = 32, 10, 300_000, 0.004
 
 
+# Directions (2, n) in which H may end off the target, where it may.
 AROUND: Vector = np.array([part(2 * math.pi / 32 * np.arange(32)) for part in (np.cos, np.sin)])
-"""Directions (2, n) in which H may end off the target, where it may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,10 +302,9 @@ def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
     return rows
 
 
+# Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one
+# model; models.
 REACH, TICK_STEPS, MODELS = 2.0, 300, 4
-"""Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one
-model; models.
-"""
 
 WAYS = np.array(
     [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]

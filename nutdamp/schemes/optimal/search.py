@@ -34,59 +34,52 @@ from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
+# Shares above the cost by small angles from which a schedule is dear enough to look at shorter
+# horizons; to try other choices of burns, and firing without a pause; to try more pulses. Most
+# schedules of few pulses cost 0.1 % more, those of couples-minisat 1.2 %.
 DEARER, DEAR, SAVED = 0.03, 0.01, 0.001
-"""Shares above the cost by small angles from which a schedule is dear enough to look at shorter
-horizons; to try other choices of burns, and firing without a pause; to try more pulses. Most
-schedules of few pulses cost 0.1 % more, those of couples-minisat 1.2 %.
-"""
 
+# Share from which every schedule is dear: at large angles those of strong thrusters cost less than
+# small angles tell, and 13 % more (a random one) without their descent.
 ALWAYS = -1.0
-"""Share from which every schedule is dear: at large angles those of strong thrusters cost less than
-small angles tell, and 13 % more (a random one) without their descent.
-"""
 
+# Units of work where H may move, so that some are left for schedules that keep it.
 MOST_LOOSE = 5000.0
-"""Units of work where H may move, so that some are left for schedules that keep it."""
 
+# Choices of burns, at small angles and then along the flight before; flights along which each is
+# corrected.
 CHOICES, AIMS = 3, 8
-"""Choices of burns, at small angles and then along the flight before; flights along which each is
-corrected.
-"""
 
+# Share of what is to do that corrected burns may lack; end error, rad, below which a flight is
+# refined.
 LOST, NEAR = 0.5, 0.05
-"""Share of what is to do that corrected burns may lack; end error, rad, below which a flight is
-refined.
-"""
 
+# Share of the cost that a further correction must save for another one to follow.
 SETTLED = 0.0005
-"""Share of the cost that a further correction must save for another one to follow."""
 
+# Pulses for each equation up to which more pulses are tried: couples-minisat costs 1.2 % less.
 FEW = 2
-"""Pulses for each equation up to which more pulses are tried: couples-minisat costs 1.2 % less."""
 
+# Schedules of other schemes that are corrected to cost less, and exact ones put on ticks.
 WAYS = 3
-"""Schedules of other schemes that are corrected to cost less, and exact ones put on ticks."""
 
+# Shorter horizons that are looked at where there is a schedule already.
 HALVINGS = 3
-"""Shorter horizons that are looked at where there is a schedule already."""
 
+# Inertial nutation periods up to which very many starts are tried, and within which a strong
+# channel does all.
 SHORT, STRONG = 4.0, 0.3
-"""Inertial nutation periods up to which very many starts are tried, and within which a strong
-channel does all.
-"""
 
+# Shares above the rigorous bound below which very many starts, and schedules that keep H, are not
+# tried.
 PROVED, EQUAL = 0.002, 1e-6
-"""Shares above the rigorous bound below which very many starts, and schedules that keep H, are not
-tried.
-"""
 
+# Share by which the end of the horizon seems dearer than its beginning to the program: of equals
+# early burns are taken. Less than `SAME_COST`.
 HASTE = 0.0008
-"""Share by which the end of the horizon seems dearer than its beginning to the program: of equals
-early burns are taken. Less than `SAME_COST`.
-"""
 
+# Share of the tightest bound that may be left where no schedule is exact.
 NEARLY = 0.05
-"""Share of the tightest bound that may be left where no schedule is exact."""
 
 
 class Search(Problem):
@@ -258,8 +251,8 @@ class Search(Problem):
         return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
 
+# One way to a schedule that costs less than the best one before, if there is one.
 Attempt = Callable[[Search, Schedule | None], Schedule | None]
-"""One way to a schedule that costs less than the best one before, if there is one."""
 
 
 def by_program(search: Search, _: Schedule | None) -> Schedule | None:
@@ -459,8 +452,8 @@ def without_overtaxed(search: Search) -> Search | None:
         ) from None
 
 
+# Relative accuracy of a horizon that is named as needed.
 NAMED = 5e-3
-"""Relative accuracy of a horizon that is named as needed."""
 
 
 def refusal(search: Search) -> Infeasible:
@@ -546,13 +539,12 @@ def fewest(search: Search) -> Schedule:
     return search.with_bounds(schedule)
 
 
+# Relative accuracy of a least time by schedules found.
 SHARP = 0.02
-"""Relative accuracy of a least time by schedules found."""
 
+# Shares added to the program's least time, tried in turn: small angles let channels fire at once,
+# schedules do not.
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""Shares added to the program's least time, tried in turn: small angles let channels fire at once,
-schedules do not.
-"""
 
 
 def soonest(search: Search) -> Schedule:
@@ -594,23 +586,20 @@ def shortest(search: Search) -> Search:
 
 # --- an earlier end at the same cost
 
+# Share of the end at which small angles must allow the cost, for an earlier one to be looked for,
+# and the excess.
 CLEARLY, ABOUT = 0.8, 0.002
-"""Share of the end at which small angles must allow the cost, for an earlier one to be looked for,
-and the excess.
-"""
 
 BISECTIONS = 3
 ROUNDS = 3
+# Steps in which the earliest end is found that they allow; earlier ends looked for one after the
+# other; horizons that are tried in turn, as parts of the way from the earliest end that they allow
+# to the end there is.
 PARTS = (0.2, 0.4, 0.6)
-"""Steps in which the earliest end is found that they allow; earlier ends looked for one after the
-other; horizons that are tried in turn, as parts of the way from the earliest end that they allow to
-the end there is.
-"""
 
+# Units of `work` after which no other end is looked for, and for all of them; how many more with
+# three moments.
 EARLIER, MOST_ENDS, INTEGRATED = 300.0, 900.0, 4.0
-"""Units of `work` after which no other end is looked for, and for all of them; how many more with
-three moments.
-"""
 
 
 def hastened(search: Search, best: Schedule) -> Schedule:
