@@ -434,20 +434,52 @@ class Descent:
         move[lost], prices[lost] = 0.0, 0.0
         penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
         ahead = np.einsum("bi,bi->b", uphill, move)
-        line = _LineSearch(self, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
+        # Cost, barrier and misses together fall by this along the step at first.
+        falling = np.minimum(ahead - penalty * np.abs(old.misses).sum(axis=1), 0.0)
         closer = np.einsum("bri,bi->br", rows, move)
         step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
-        there = line.tried(step)
-        if len(k := line.active):  # the equations are curved: from there back onto them
+        x, slack, misses = old.x.copy(), old.slack.copy(), old.misses.copy()
+
+        def merit(x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
+            dear = np.einsum("bi,bi->b", self.price[k], x / self.scale[k])
+            dear -= old.barrier[k] * np.log(slack).sum(axis=1)
+            return np.asarray(dear + penalty[k] * np.abs(misses).sum(axis=1))
+
+        every = np.arange(len(x))
+        before = merit(x, slack, misses, every)
+
+        def tried(active: Indices, step: Vector, shares: Vector) -> tuple[Indices, Vector]:
+            """Take the first share of the scaled ``step`` (k, v) of the ``active`` sequences that
+            falls enough, or the last: those for which none does, and their misses.
+            """
+            count = len(shares)
+            k = np.tile(active, count)
+            share = np.repeat(shares, len(active))
+            steps = share[:, None] * np.tile(step, (count, 1))
+            room = old.slack[k] + np.einsum("bri,bi->br", rows[k], steps)
+            inside = np.all(room > LEAST_ROOM * old.slack[k], axis=1)  # as much must be left
+            to = np.where(inside[:, None], old.x[k] + steps * self.scale[k], old.x[k])
+            room = np.where(inside[:, None], room, old.slack[k])
+            missed = self.task.misses(self.sequences.which[k], to, ideal=self.ideal)
+            least = before[k] + 1e-4 * share * falling[k] + 1e-11 * np.abs(before[k])
+            enough = (inside & (merit(to, room, missed, k) <= least)).reshape(count, -1)
+            stuck = ~enough.any(axis=0)
+            first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck)
+            first += np.arange(len(stuck))
+            x[active], slack[active], misses[active] = to[first], room[first], missed[first]
+            return active[stuck], missed[first][stuck]
+
+        active, there = tried(every, step, WHOLE)
+        if len(active):  # the equations are curved: from there back onto them
+            k = active
             back, _ = _newton(old.slopes[k], curvature[k], 0.0 * step[k], there, 0.0 * prices[k])
-            line.tried(step[k] + back)
-        if len(line.active):
-            line.tried(step[line.active], SHARES)
-        x, slack, misses = line.x, line.slack, line.misses
+            active, _ = tried(k, step[k] + back, WHOLE)
+        if len(active):
+            active, _ = tried(active, step[active], SHARES)
         slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, ideal=self.ideal)
         change = np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
         curvature = _curved(old.curvature, (x - old.x) / self.scale, change)
-        curvature[line.active] = np.eye(x.shape[1])
+        curvature[active] = np.eye(x.shape[1])
         dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer
         central = old.barrier[:, None] / slack
@@ -470,62 +502,6 @@ class Descent:
         return DescentState(
             x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error
         )
-
-
-class _LineSearch:
-    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at
-    first.
-    """
-
-    def __init__(self, descent: Descent, penalty: Vector, slope: Vector) -> None:
-        self.descent, self.old, self.penalty, self.slope = (
-            descent,
-            descent.state,
-            penalty,
-            np.minimum(slope, 0.0),
-        )
-        self.x, self.slack, self.misses = (
-            self.old.x.copy(),
-            self.old.slack.copy(),
-            self.old.misses.copy(),
-        )
-        self.active = np.arange(len(penalty))  # sequences for which no step was good enough so far
-        self.before = self._merit(self.x, self.slack, self.misses, self.active)
-
-    def tried(self, step: Vector, shares: Vector = WHOLE) -> Vector:
-        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the
-        misses of these.
-        """
-        count = len(shares)
-        k = np.tile(self.active, len(shares))
-        share = np.repeat(shares, len(self.active))
-        old = self.old
-        step = share[:, None] * np.tile(step, (count, 1))
-        slack = old.slack[k] + np.einsum("bri,bi->br", self.descent.rows[k], step)
-        inside = np.all(
-            slack > LEAST_ROOM * old.slack[k], axis=1
-        )  # as much of the room must be left
-        x = np.where(inside[:, None], old.x[k] + step * self.descent.scale[k], old.x[k])
-        slack = np.where(inside[:, None], slack, old.slack[k])
-        misses = self.descent.task.misses(
-            self.descent.sequences.which[k], x, ideal=self.descent.ideal
-        )
-        least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
-        enough = (inside & (self._merit(x, slack, misses, k) <= least)).reshape(count, -1)
-        stuck = ~enough.any(axis=0)
-        # Rows of the first that falls enough.
-        first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck) + np.arange(
-            len(stuck)
-        )
-        for part, there in ((self.x, x), (self.slack, slack), (self.misses, misses)):
-            part[self.active] = there[first]
-        self.active = self.active[stuck]
-        return np.asarray(misses[first][stuck])
-
-    def _merit(self, x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
-        dear = np.einsum("bi,bi->b", self.descent.price[k], x / self.descent.scale[k])
-        dear -= self.old.barrier[k] * np.log(slack).sum(axis=1)
-        return np.asarray(dear + self.penalty[k] * np.abs(misses).sum(axis=1))
 
 
 def _weighted(rows: Vector, weight: Vector) -> Vector:

@@ -493,7 +493,20 @@ def refusal(search: Search) -> Infeasible:
             free = Search(spacecraft, replace(search.options, free_axis=True, shift=None))
             if by_program(free, None) is not None:
                 cures.append("with --free-axis a schedule exists")
-    reason = f"within {spacecraft.horizon:.4g} s {shortfall(search)}"
+    nutation = search.program(equations=EndEquations(shift=False)).solve().unmet
+    plain = search.program(equations=EndEquations(shift=search.equations.shift))
+    failing = "H would shift"
+    if spacecraft.goal.axis is not None:
+        failing = "H cannot be brought to the target"
+    if search.equations.spin and plain.solve().unmet <= UNMET:
+        failing = "the spin cannot be brought to the rate of the goal"
+    if spacecraft.transverse_rate > 0.0:
+        failing = f"the nutation can be removed, but {failing}"
+    if nutation > UNMET:
+        names = ", ".join(channel.name for channel in search.channels)
+        share = 100.0 * min(nutation, 1.0)
+        failing = f"the channels ({names}) cannot remove the nutation: {share:.3g} % of it stays"
+    reason = f"within {spacecraft.horizon:.4g} s {failing}"
     if unproved:
         reason = (
             f"within {bounded_by(spacecraft)} the search found no schedule for the true "
@@ -503,26 +516,6 @@ def refusal(search: Search) -> Infeasible:
         reason = f"schedules exist at small angles; {reason}"
     text = "; ".join(filter(None, [reason, *cures]))
     return NotFound(text) if unproved else Infeasible(text)
-
-
-def shortfall(search: Search) -> str:
-    """Failing of the channels within the horizon, by the program of small angles."""
-    spacecraft = search.spacecraft
-    goal = spacecraft.goal
-    nutation = search.program(equations=EndEquations(shift=False)).solve().unmet
-    if nutation > UNMET:
-        names = ", ".join(channel.name for channel in search.channels)
-        share = 100.0 * min(nutation, 1.0)
-        return f"the channels ({names}) cannot remove the nutation: {share:.3g} % of it stays"
-    failing = "H would shift"
-    if goal.axis is not None:
-        failing = "H cannot be brought to the target"
-    plain = search.program(equations=EndEquations(shift=search.equations.shift))
-    if search.equations.spin and plain.solve().unmet <= UNMET:
-        failing = "the spin cannot be brought to the rate of the goal"
-    if spacecraft.transverse_rate > 0.0:
-        failing = f"the nutation can be removed, but {failing}"
-    return failing
 
 
 # --- the least of other things than cost
