@@ -108,7 +108,7 @@ class Search(Problem):
         attempts: list[tuple[float, Attempt]] = [
             (ALWAYS, by_program),
             (DEARER, by_shorter_programs),
-            # With three moments small angles mislead sooner, and no other plan is to be better: that
+            # With three moments small angles mislead sooner. No other plan is to be better: that
             # of two-pulse was, by 1.6 % for despun-comsat. To ask them costs up to half a second.
             (1.5 * DEAR if symmetric else 0.5 * DEAR, by_other_schemes),
             (ALWAYS, by_descent),
