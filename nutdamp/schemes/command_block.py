@@ -49,7 +49,7 @@ def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     spacecraft, commands, model = search.spacecraft, search.commands, search.model
     shares = search.flights.shares(left_by(propagation.flown(spacecraft, chosen.schedule)))
     missed = {
-        bound.part: bound.limit
+        bound.part: bound
         for bound in search.flights.bounds
         if not requirements.complies(shares[bound.part])
     }
@@ -59,7 +59,7 @@ def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     damped = abs(model.rate(spacecraft.spin)) * math.tan(spacecraft.nutation)
     aside = {Part.DISTANCE: half * abs(spacecraft.spin) * way, Part.NUTATION: half * damped}
     for part, angle in aside.items():
-        if angle > missed.get(part, math.inf):
+        if part in missed and not missed[part].met(angle):
             step = note(
                 "finer-delay-step",
                 delay_step_s=commands.delay_step,
@@ -73,7 +73,7 @@ def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
         for channel in search.channels
     ]
     along = 0.5 * min(float(np.diff(np.sort(turns), prepend=0.0).min()) for turns in turned)
-    if along > min(missed.values(), default=math.inf):
+    if not all(bound.met(along) for bound in missed.values()):
         named.append(note("finer-widths", change_deg=math.degrees(2.0 * along)))
     return [*named, *used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
 
@@ -321,8 +321,10 @@ def leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float | None) -> Spacec
     goal, commands = spacecraft.goal.spin, at_leg.commands
     assert goal is not None
     assert commands is not None
-    bounds = {bound.part: bound.limit for bound in requirements.bounds(spacecraft)}
-    nutation, shift = bounds[Part.NUTATION], bounds.get(requirements.aim(spacecraft))
+    bounds = {bound.part: bound for bound in requirements.bounds(spacecraft)}
+    damped, aimed = bounds[Part.NUTATION], bounds.get(requirements.aim(spacecraft))
+    nutation = damped.limit
+    shift = None if aimed is None else aimed.limit
     horizon, channels = at_leg.horizon, at_leg.channels
     # Share of |H3| that a change of spin leaves: the nutation opens by its inverse.
     share = abs(float(spacecraft.inertia.axial(goal)) / at_leg.axial)
@@ -333,7 +335,7 @@ def leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float | None) -> Spacec
         nutation = max(at_leg.nutation / slower / MARGIN, nutation)
         shift = None if shift is None else max(at_leg.to_turn / MARGIN, shift)
         channels = tuple(channel for channel in channels if not channel.damps)
-    elif at_leg.nutation <= nutation and (shift is None or at_leg.to_turn <= shift):
+    elif damped.met(at_leg.nutation) and (aimed is None or aimed.met(at_leg.to_turn)):
         return None
     elif not requirements.spins_at(at_leg, goal):
         nutation *= MARGIN * slower
