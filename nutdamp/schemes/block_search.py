@@ -207,50 +207,33 @@ class BlockSearch:
         size = len(width)
         if not size:
             return rows[:0], width, count
-        if self.whole and not last:
-            chosen = np.ones((len(rows), size), dtype=bool)
-        else:
+        spent = count * acts(channel, width).on_time
+        chosen = np.full((len(rows), size), self.whole and not last)
+        if not (self.whole and not last):
             misses = self.misses(before.state, channel, every, width, count)
         if self.whole:
-            spent = count * acts(channel, width).on_time * channel.cost_rate(by_propellant=True)
             if last:
                 chosen = misses <= max(DOUBTFUL, float(misses.min()))
             if self.model.steady:
-                chosen &= before.cost[:, None] + spent < self.flights.cheapest
+                price = channel.cost_rate(by_propellant=True)
+                chosen &= before.cost[:, None] + price * spent < self.flights.cheapest
         else:
+            # The few cheapest that do, the nearest, the gentle that damp most, and some of these.
             few = FIRST_PAIRS if first else PAIRS
-            chosen = self._by_merits(before.state, kind, (width, count), misses, few)
+            gentle = np.flatnonzero(count <= GENTLE)
+            if self.flights.damps:
+                damped = misses[:, gentle]
+            else:
+                some = width[gentle], count[gentle]
+                damped = self.damping_misses(before.state, channel, every, *some)
+            at_row = rows[:, None]
+            in_order = np.where(complies(misses), spent / spent.max() - 2.0 + 1e-9 * misses, misses)
+            chosen[at_row, least(in_order, few)] = True
+            chosen[at_row, least(misses, few)] = True
+            chosen[at_row, gentle[least(damped, few)]] = True
+            chosen[:, evenly(gentle, few)] = True
         at = np.nonzero(chosen)
         return rows[at[0]], width[at[1]], count[at[1]]
-
-    def _by_merits(
-        self,
-        state: BlockState,
-        kind: int,
-        pairs: tuple[Array, Index],
-        misses: Array,
-        few: int,
-    ) -> NDArray[np.bool_]:
-        """Of pairs the ``few`` cheapest that do, the nearest, the gentle that damp most, and some
-        of these.
-        """
-        channel, every = self.kinds[kind]
-        width, count = pairs
-        spent = acts(channel, width).on_time * count
-        gentle = np.flatnonzero(count <= GENTLE)
-        damped = misses
-        if not self.flights.damps:
-            damped = self.damping_misses(state, channel, every, width[gentle], count[gentle])
-        else:
-            damped = misses[:, gentle]
-        chosen = np.zeros(misses.shape, dtype=bool)
-        rows = np.arange(len(misses))[:, None]
-        in_order = np.where(complies(misses), spent / spent.max() - 2.0 + 1e-9 * misses, misses)
-        chosen[rows, least(in_order, few)] = True
-        chosen[rows, least(misses, few)] = True
-        chosen[rows, gentle[least(damped, few)]] = True
-        chosen[:, evenly(gentle, few)] = True
-        return chosen
 
     def beam(self, sequences: BlockSequences) -> BlockSequences:
         """The promising sequences, with the motion of their flights."""
