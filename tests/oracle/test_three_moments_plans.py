@@ -107,7 +107,7 @@ def test_a_schedule_of_touching_pulses_is_taken_down_on_the_true_motion() -> Non
     task = Search(body, OptimalOptions(free_axis=False, shift=off)).task()
     pulses = multistart._moments_of(task, Schedule(made.pulses.pulses))
     sequences, x = multistart.laid_out(task, multistart._together([pulses]), bounded=True)
-    assert np.abs(task.misses(sequences.which, x, ideal=False)).max() < 0.1 * off
+    assert np.abs(task.misses(sequences.which, x, 0)).max() < 0.1 * off
 
 
 @pytest.mark.deep

@@ -345,10 +345,7 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
             return np.array([misses(flight, problem.equations) - aside for flight in flown]) / size
         starts = spacecraft.limits.earliest + np.cumsum(rows, axis=1) - rows
         settings = np.hstack([starts[:, firing], rows[:, firing]])
-        return (
-            task.misses(np.tile(which[firing], (len(rows), 1)), settings, ideal=False)
-            - aside / size
-        )
+        return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
 
     def slopes(times: Vector, value: Vector) -> Vector:
         return (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6

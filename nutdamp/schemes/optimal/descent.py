@@ -103,25 +103,28 @@ class Task:
         self._forced = dynamics.constant, dynamics.forcing
         self._coasting = np.zeros(3), dynamics.forcing._replace(turning=(), timed=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
-        self._pace = float(np.linalg.norm(start.rates))
-        self._arcs = dynamics.free and spacecraft.growth == 0.0
+        self._decays = spacecraft.growth != 0.0
+        self._free = dynamics.free and not self._decays
         self._linear = None if spacecraft.inertia.symmetric else small_angles(spacecraft, equations)
         self._across = square_to_target(spacecraft)
 
-    def misses(self, which: Indices, x: Vector, *, ideal: bool) -> Vector:
+    def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
-        ``ideal``: pulses act as impulses at their centres, without disturbances, with I1 ≠ I2 as at
-        small angles; else the true motion.
+        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at
+        small angles; 0: the true motion.
         """
+        parts = [slice(begin, begin + BLOCK) for begin in range(0, len(x), BLOCK)]
+        flown = [self._misses(which[part], x[part], kicks) for part in parts]
+        return np.concatenate([np.zeros((0, len(self.chosen))), *flown])
+
+    def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
-        work.spend(2 * n * (FLIGHT + CASE * count))
-        if ideal and self._linear is not None:
+        work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
+        if kicks and self._linear is not None:
             return self._at_small_angles(self._linear, which, x)
-        parts = [slice(begin, begin + BLOCK) for begin in range(0, max(count, 1), BLOCK)]
-        fly = self._together if self._arcs else self._in_turn
-        flown = [fly(which[part], x[part], ideal) for part in parts]
-        momentum, turn = (np.concatenate(part, axis=1) for part in zip(*flown, strict=True))
+        flown = self._together if self._free or (kicks and not self._decays) else self._in_turn
+        momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
         shift[inertial @ self.spacecraft.target_axis < 0.0] += (
@@ -140,35 +143,37 @@ class Task:
         on = x[:, n : 2 * n]
         rows = linear.rows((x[:, :n] + 0.5 * on).ravel()) * linear.widths(on.ravel())[:, :, None]
         impulses = self.torques[which] * on[:, :, None]
-        shape = (*which.shape, len(self.chosen), 3)
-        left = np.einsum("bnek,bnk->be", rows.reshape(shape), impulses) - linear.goal
+        left = np.einsum("bnek,bnk->be", rows.reshape(*which.shape, -1, 3), impulses) - linear.goal
         if self.loose:
             left[:, 2:4] -= self.off * x[:, -2:]
         return np.asarray(left / self.momentum)
 
-    def _in_turn(self, which: Indices, x: Vector, ideal: bool) -> tuple[Vector, Vector]:
+    def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
-        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1], initial=0.0)) * self._pace
+        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(
+            np.linalg.norm(self._start[1])
+        )
         work.spend(turned * (RADIAN + CASE_RADIAN * count))
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        bodies = Bodies(moments, *(self._coasting if ideal else self._forced))
+        bodies = Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
         for pulse in range(n):
-            begin, on_time = x[:, pulse], x[:, n + pulse]
+            begin = x[:, pulse]
+            on_time = x[:, n + pulse]
             torque = self.torques[which[:, pulse]].T
-            if ideal:
-                begin = begin + 0.5 * on_time
-            advance(MotionStretch(bodies, now, rates, turn), begin - now)
-            now = begin
-            if ideal:
-                rates += torque * on_time / moments
-            else:
+            for kick in range(kicks):
+                t = begin + on_time * ((kick + 0.5) / kicks)
+                advance(MotionStretch(bodies, now, rates, turn), t - now)
+                rates += torque * (on_time / kicks) / moments
+                now = t
+            if not kicks:
+                advance(MotionStretch(bodies, now, rates, turn), begin - now)
                 advance(MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
         return bodies.momentum(rates), turn
 
-    def _together(self, which: Indices, x: Vector, ideal: bool) -> tuple[Vector, Vector]:
+    def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """`_in_turn` of a body without external torque, all stretches at once."""
         # In the frame that turns with the nutation pulses add to H whatever it is, and between them
         # the body turns about H and its own axis: so the motion at all edges is known first, and
@@ -176,10 +181,14 @@ class Task:
         count, n = which.shape
         (A, _, C), rates, turn = self._start
         wheel = self.spacecraft.inertia.wheel
-        starts, widths = x[:, :n], x[:, n : 2 * n]
-        impulses = self.torques[which] * widths[:, :, None]
-        if ideal:
-            starts, widths = starts + 0.5 * widths, np.zeros_like(widths)
+        parts = max(kicks, 1)
+        starts = x[:, :n]
+        widths = x[:, n : 2 * n]
+        impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
+        if kicks:
+            shares = (np.arange(kicks) + 0.5) / kicks
+            starts = (starts[:, :, None] + widths[:, :, None] * shares).reshape(count, n * kicks)
+            widths = np.zeros_like(starts)
         coasts = np.diff(starts, axis=1, prepend=0.0)
         coasts[:, 1:] -= widths[:, :-1]
         axial = C * rates[2] + wheel + np.cumsum(impulses[:, :, 2], axis=1)
@@ -189,11 +198,11 @@ class Task:
         phase = np.cumsum(turned + within, axis=1)
         begun = np.exp(1j * (phase - within))  # as each pulse begins
         added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
-        if not ideal and self.torques[:, 2].any():
+        if not kicks and self.torques[:, 2].any():
             added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(
                 1j * within
             )
-        elif not ideal:
+        elif not kicks:
             added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
         after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
         across = (
@@ -204,7 +213,7 @@ class Task:
         sine /= np.where(size > 0.0, size, 1.0)
         half = np.exp(0.5j * turned)
         first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
-        if not ideal:
+        if not kicks:
             turns = zip(
                 (first, second), self._pulsed(which, across, before, widths)[1:], strict=True
             )
@@ -238,17 +247,13 @@ class Task:
         after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
         return after * self._start[0][0], *turned
 
-    def slopes(
-        self, which: Indices, x: Vector, scale: Vector, here: Vector, *, ideal: bool
-    ) -> Vector:
+    def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
         """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b,
         equations, …).
         """
         number = x.shape[1]
         moved = x[:, None, :] + DIFFERENCE * scale[:, None, :] * np.eye(number)
-        there = self.misses(
-            np.repeat(which, number, axis=0), moved.reshape(-1, number), ideal=ideal
-        )
+        there = self.misses(np.repeat(which, number, axis=0), moved.reshape(-1, number), kicks)
         changes = there.reshape(*moved.shape[:2], len(self.chosen)) - here[:, None, :]
         return np.swapaxes(changes, 1, 2) / DIFFERENCE
 
@@ -340,9 +345,9 @@ class Descent:
     """The descents of ``sequences`` from ``x`` (b, v), which must lie within all bounds."""
 
     def __init__(
-        self, task: Task, sequences: Sequences, x: Vector, *, ideal: bool, barrier: float = 0.1
+        self, task: Task, sequences: Sequences, x: Vector, *, kicks: int, barrier: float = 0.1
     ) -> None:
-        self.task, self.sequences, self.ideal = task, sequences, ideal
+        self.task, self.sequences, self.kicks = task, sequences, kicks
         which, (count, number) = sequences.which, x.shape
         n = which.shape[1]
         # Natural sizes of the unknowns.
@@ -356,13 +361,13 @@ class Descent:
         self.price = np.zeros_like(self.scale)
         self.price[:, n : 2 * n] = (task.costs * task.unit)[which] / task.least
         slack = (x @ rows.T - levels) / size
-        misses = task.misses(which, x, ideal=ideal)
+        misses = task.misses(which, x, kicks)
         self.state = DescentState(
             x=np.array(x),
             slack=slack,
             dual=barrier / slack,
             misses=misses,
-            slopes=task.slopes(which, x, self.scale, misses, ideal=ideal),
+            slopes=task.slopes(which, x, self.scale, misses, kicks),
             prices=np.zeros((count, len(task.chosen))),
             curvature=np.repeat(np.eye(number)[None], count, axis=0),
             barrier=np.full(count, barrier),
@@ -413,7 +418,7 @@ class Descent:
             closer = np.einsum("bri,bi->br", self.rows, move)
             step = _to_bound(state.slack, closer, np.full(len(move), 0.5))[:, None]
             x, slack = state.x + step * move * self.scale, state.slack + step * closer
-            misses = self.task.misses(which, x, ideal=self.ideal)
+            misses = self.task.misses(which, x, self.kicks)
             better = np.abs(misses).sum(axis=1) < np.abs(state.misses).sum(axis=1)
             if not better.any():
                 break
@@ -434,52 +439,20 @@ class Descent:
         move[lost], prices[lost] = 0.0, 0.0
         penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
         ahead = np.einsum("bi,bi->b", uphill, move)
-        # Cost, barrier and misses together fall by this along the step at first.
-        falling = np.minimum(ahead - penalty * np.abs(old.misses).sum(axis=1), 0.0)
+        line = _LineSearch(self, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
         closer = np.einsum("bri,bi->br", rows, move)
         step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
-        x, slack, misses = old.x.copy(), old.slack.copy(), old.misses.copy()
-
-        def merit(x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
-            dear = np.einsum("bi,bi->b", self.price[k], x / self.scale[k])
-            dear -= old.barrier[k] * np.log(slack).sum(axis=1)
-            return np.asarray(dear + penalty[k] * np.abs(misses).sum(axis=1))
-
-        every = np.arange(len(x))
-        before = merit(x, slack, misses, every)
-
-        def tried(active: Indices, step: Vector, shares: Vector) -> tuple[Indices, Vector]:
-            """Take the first share of the scaled ``step`` (k, v) of the ``active`` sequences that
-            falls enough, or the last: those for which none does, and their misses.
-            """
-            count = len(shares)
-            k = np.tile(active, count)
-            share = np.repeat(shares, len(active))
-            steps = share[:, None] * np.tile(step, (count, 1))
-            room = old.slack[k] + np.einsum("bri,bi->br", rows[k], steps)
-            inside = np.all(room > LEAST_ROOM * old.slack[k], axis=1)  # as much must be left
-            to = np.where(inside[:, None], old.x[k] + steps * self.scale[k], old.x[k])
-            room = np.where(inside[:, None], room, old.slack[k])
-            missed = self.task.misses(self.sequences.which[k], to, ideal=self.ideal)
-            least = before[k] + 1e-4 * share * falling[k] + 1e-11 * np.abs(before[k])
-            enough = (inside & (merit(to, room, missed, k) <= least)).reshape(count, -1)
-            stuck = ~enough.any(axis=0)
-            first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck)
-            first += np.arange(len(stuck))
-            x[active], slack[active], misses[active] = to[first], room[first], missed[first]
-            return active[stuck], missed[first][stuck]
-
-        active, there = tried(every, step, WHOLE)
-        if len(active):  # the equations are curved: from there back onto them
-            k = active
+        there = line.tried(step)
+        if len(k := line.active):  # the equations are curved: from there back onto them
             back, _ = _newton(old.slopes[k], curvature[k], 0.0 * step[k], there, 0.0 * prices[k])
-            active, _ = tried(k, step[k] + back, WHOLE)
-        if len(active):
-            active, _ = tried(active, step[active], SHARES)
-        slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, ideal=self.ideal)
+            line.tried(step[k] + back)
+        if len(line.active):
+            line.tried(step[line.active], SHARES)
+        x, slack, misses = line.x, line.slack, line.misses
+        slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, self.kicks)
         change = np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
         curvature = _curved(old.curvature, (x - old.x) / self.scale, change)
-        curvature[active] = np.eye(x.shape[1])
+        curvature[line.active] = np.eye(x.shape[1])
         dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer
         central = old.barrier[:, None] / slack
@@ -502,6 +475,60 @@ class Descent:
         return DescentState(
             x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error
         )
+
+
+class _LineSearch:
+    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at
+    first.
+    """
+
+    def __init__(self, descent: Descent, penalty: Vector, slope: Vector) -> None:
+        self.descent, self.old, self.penalty, self.slope = (
+            descent,
+            descent.state,
+            penalty,
+            np.minimum(slope, 0.0),
+        )
+        self.x, self.slack, self.misses = (
+            self.old.x.copy(),
+            self.old.slack.copy(),
+            self.old.misses.copy(),
+        )
+        self.active = np.arange(len(penalty))  # sequences for which no step was good enough so far
+        self.before = self._merit(self.x, self.slack, self.misses, self.active)
+
+    def tried(self, step: Vector, shares: Vector = WHOLE) -> Vector:
+        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the
+        misses of these.
+        """
+        count = len(shares)
+        k = np.tile(self.active, len(shares))
+        share = np.repeat(shares, len(self.active))
+        old = self.old
+        step = share[:, None] * np.tile(step, (count, 1))
+        slack = old.slack[k] + np.einsum("bri,bi->br", self.descent.rows[k], step)
+        inside = np.all(
+            slack > LEAST_ROOM * old.slack[k], axis=1
+        )  # as much of the room must be left
+        x = np.where(inside[:, None], old.x[k] + step * self.descent.scale[k], old.x[k])
+        slack = np.where(inside[:, None], slack, old.slack[k])
+        misses = self.descent.task.misses(self.descent.sequences.which[k], x, self.descent.kicks)
+        least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
+        enough = (inside & (self._merit(x, slack, misses, k) <= least)).reshape(count, -1)
+        stuck = ~enough.any(axis=0)
+        # Rows of the first that falls enough.
+        first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck) + np.arange(
+            len(stuck)
+        )
+        for part, there in ((self.x, x), (self.slack, slack), (self.misses, misses)):
+            part[self.active] = there[first]
+        self.active = self.active[stuck]
+        return np.asarray(misses[first][stuck])
+
+    def _merit(self, x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
+        dear = np.einsum("bi,bi->b", self.descent.price[k], x / self.descent.scale[k])
+        dear -= self.old.barrier[k] * np.log(slack).sum(axis=1)
+        return np.asarray(dear + self.penalty[k] * np.abs(misses).sum(axis=1))
 
 
 def _weighted(rows: Vector, weight: Vector) -> Vector:

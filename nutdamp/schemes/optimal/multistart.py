@@ -51,6 +51,11 @@ FOUND, EXACT = (
 # good for it.
 NEEDLESS, NOTHING = 1e-3, 1e-10
 
+WIDE, MOST_KICKS = (
+    0.25,
+    24,
+)  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
+
 # Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses;
 # the fewest.
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
@@ -92,7 +97,7 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
         sequences, x = random_starts(task, pulses, STARTS, rng)
         if len(x):
             break
-    descent = Descent(task, sequences, x, ideal=True)
+    descent = Descent(task, sequences, x, kicks=1)
     for steps, share in ROUNDS:  # after each only the better part, misses and all, goes on
         descent.run(steps)
         score = np.nan_to_num(descent.cost / task.least + UNMET_COST * descent.left, nan=np.inf)
@@ -102,7 +107,7 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
         added = _added(task, best, _pulses(task, SPARE), rng)
         if not added:
             break
-        descent = Descent(task, *laid_out(task, _together(added)), ideal=True, barrier=1e-2)
+        descent = Descent(task, *laid_out(task, _together(added)), kicks=1, barrier=1e-2)
         descent.run(50)
         more = _best(descent)
         if not len(more.cost) or more.cost[0] > best.cost[0] * (1.0 - GAIN):
@@ -122,7 +127,7 @@ def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
     ):  # pulses that touched lie apart now, and miss too much for few steps
         ways.append((APART, MOVES))
     for barrier, steps in ways if len(x) else ():
-        if lowered := _lowered(Descent(task, sequences, x, ideal=False, barrier=barrier), steps):
+        if lowered := _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), steps):
             return _schedule(task, lowered[0])
     return None
 
@@ -183,7 +188,7 @@ def laid_out(task: Task, moments: Moments, *, bounded: bool = False) -> tuple[Se
     sequences = Sequences(which, begins, ends, least, longest)
     x = np.hstack([start, on, np.zeros((len(t), task.loose))])
     if bounded and task.loose:  # H begins as far off its target as they leave it
-        off = task.misses(which, x, ideal=False)[:, 2:4] * task.momentum / task.off
+        off = task.misses(which, x, 0)[:, 2:4] * task.momentum / task.off
         x[:, -2:] = off * (INSIDE / np.maximum(np.hypot(*off.T), INSIDE))[:, None]
     rows, levels = task.bounds(sequences)
     fits = np.all(x @ rows.T > levels, axis=1)
@@ -239,8 +244,8 @@ def _worth(task: Task, ideal: Moments, x: Vector, prices: Vector, t: Vector) -> 
     )
     which, centres, on = Moments(*joined).in_order()
     loose = np.tile(x[2 * len(ideal.which) :], (len(channel), 1))
-    there = task.misses(which, np.hstack([centres - 0.5 * on, on, loose]), ideal=True)
-    here = task.misses(ideal.which[None], x[None], ideal=True)
+    there = task.misses(which, np.hstack([centres - 0.5 * on, on, loose]), 1)
+    here = task.misses(ideal.which[None], x[None], 1)
     # By the prices of the equations: its change in them, less its cost.
     worth = -(there - here) / SMALL @ prices - (task.costs * task.unit / task.least)[channel]
     return np.asarray(worth.reshape(count, len(t)))
@@ -283,7 +288,15 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
         together = _together([moments for moments in fewer if len(moments.which) == count])
         sequences, x = laid_out(task, together, bounded=True)
         if len(x):
-            lowered += _lowered(Descent(task, sequences, x, ideal=False, barrier=1e-4), 30)
+            barrier = 1e-4
+            widest = float(np.max(together.on)) / task.pace
+            if widest > WIDE:  # kicks fly faster than the true motion
+                kicks = min(math.ceil(widest / WIDE), MOST_KICKS)
+                descent = Descent(task, sequences, x, kicks=kicks, barrier=barrier)
+                descent.run(30)
+                x = descent.state.x
+                barrier = 1e-6
+            lowered += _lowered(Descent(task, sequences, x, kicks=0, barrier=barrier), 20)
     return lowered
 
 
