@@ -153,9 +153,6 @@ class BlockFlights:
         if self.of and self.best().complies:
             self.cheapest = min(self.cheapest, self.best().reckoned)
 
-    def _flown(self, schedule: Schedule) -> float:
-        return float(self.share(left_by(propagation.flown(self.spacecraft, schedule))))
-
     def best(self) -> FlownSequence:
         """The best flight, confirmed by the limits and by the flight of its pulses alone."""
         while True:
@@ -168,7 +165,8 @@ class BlockFlights:
         """The flight with its true rank."""
         schedule = flight.schedule
         breaks = not keeps_limits(self.spacecraft, schedule)
-        rank = _rank(schedule, self._flown(schedule), breaks=breaks)
+        share = float(self.share(left_by(propagation.flown(self.spacecraft, schedule))))
+        rank = _rank(schedule, share, breaks=breaks)
         return flight._replace(rank=rank, confirmed=True)
 
     def chosen(self) -> FlownSequence:

@@ -43,21 +43,18 @@ BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waite
 ALWAYS = 500  # Sun pulses that flights of blocks may take whatever work is spent
 NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
+# Units of `work` of a step of Newton's method to a Sun pulse under thrust: the plan of a steerable
+# stage that is pushed for a turn and more took 5 s of which nothing was charged.
 LOOKED_BACK = 2.0
-"""Units of `work` of a step of Newton's method to a Sun pulse under thrust: the plan of a steerable
-stage that is pushed for a turn and more took 5 s of which nothing was charged.
-"""
 
+# Steps of Newton's method to a Sun pulse of flights that are integrated, beyond which each takes
+# `work`, and units of it: where dissipation lets the nutation grow past 60 deg a search took 14 s
+# of which 9 s were charged.
 USUAL, MOVED = 8, 0.7
-"""Steps of Newton's method to a Sun pulse of flights that are integrated, beyond which each takes
-`work`, and units of it: where dissipation lets the nutation grow past 60 deg a search took 14 s of
-which 9 s were charged.
-"""
 
+# Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
+# of a turn of theirs that is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
 FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 6.0
-"""Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
-of a turn of theirs that is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
-"""
 
 KEPT = 4_000_000  # entries of tables of the supply that are kept
 

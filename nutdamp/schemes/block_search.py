@@ -49,24 +49,21 @@ WINDOWS = 8
 # share of a spin turn by which blocks in closed form keep away from blackout windows: nutation
 # moves Sun pulses
 BESIDE = 0.01
+# Pairs of width and number that are looked at by each merit, for the first block and others.
 FIRST_PAIRS, PAIRS = 256, 16
-"""Pairs of width and number that are looked at by each merit, for the first block and others."""
 GENTLE = 4  # pulses of a block that is gentle
-WIDTHS = 24  # widths near that of a flown block that are looked at
+# Cheapest pairs that are looked at not only where they damp most, but at as many delays: the next
+# block takes what they leave only if its pulse is as large as that.
 PHASED, PHASES = 4, 12
-"""Cheapest pairs that are looked at not only where they damp most, but at as many delays: the next
-block takes what they leave only if its pulse is as large as that.
-"""
 BEAM = 32  # sequences that are continued, by each merit
 COARSE = 300  # cheapest sequences that are continued where delays are few: as in cb5030
 DOUBTFUL = 1.5  # share of a bound up to which the closed form may err
 FLOWN = 64  # sequences that are flown together, by each merit
+FIRST = 12  # sequences that are flown first
 BATCHES = 16  # multiple of `FLOWN` of doubtful sequences that are flown, the cheapest first
 FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
 # multiple of the least cost above which further blocks are looked for though one complies
 DEAR = 1.5
-NEIGHBOURS = 12  # flights near which others are looked for
-ROUNDS = 4  # searches near the best flights, where none complies
 CHUNK = 200_000  # trials whose motion is computed at once: arrays that the caches hold
 LOOKED = 1e-6  # units of `work` of a block that is looked at
 
@@ -128,14 +125,6 @@ class BlockSearch:
                 break
             beam = sequences if self.whole else self.beam(sequences)
             if not len(beam.share):
-                break
-        for _ in range(ROUNDS):
-            if not self.flights.of or math.isfinite(self.flights.cheapest) or work.exhausted():
-                break
-            flown = len(self.flights.of)
-            for sequences in self.neighbours():
-                self.fly(sequences)
-            if len(self.flights.of) == flown:
                 break
 
     @property
@@ -218,69 +207,33 @@ class BlockSearch:
         size = len(width)
         if not size:
             return rows[:0], width, count
-        if self.whole and not last:
-            chosen = np.ones((len(rows), size), dtype=bool)
-        else:
+        spent = count * acts(channel, width).on_time
+        chosen = np.full((len(rows), size), self.whole and not last)
+        if not (self.whole and not last):
             misses = self.misses(before.state, channel, every, width, count)
         if self.whole:
-            spent = count * acts(channel, width).on_time * channel.cost_rate(by_propellant=True)
             if last:
                 chosen = misses <= max(DOUBTFUL, float(misses.min()))
             if self.model.steady:
-                chosen &= before.cost[:, None] + spent < self.flights.cheapest
+                price = channel.cost_rate(by_propellant=True)
+                chosen &= before.cost[:, None] + price * spent < self.flights.cheapest
         else:
+            # The few cheapest that do, the nearest, the gentle that damp most, and some of these.
             few = FIRST_PAIRS if first else PAIRS
-            chosen = self._by_merits(before.state, kind, (width, count), misses, few)
-            if not last:
-                chosen[:, self._part_way(before.state, kind, width, count)] = True
+            gentle = np.flatnonzero(count <= GENTLE)
+            if self.flights.damps:
+                damped = misses[:, gentle]
+            else:
+                some = width[gentle], count[gentle]
+                damped = self.damping_misses(before.state, channel, every, *some)
+            at_row = rows[:, None]
+            in_order = np.where(complies(misses), spent / spent.max() - 2.0 + 1e-9 * misses, misses)
+            chosen[at_row, least(in_order, few)] = True
+            chosen[at_row, least(misses, few)] = True
+            chosen[at_row, gentle[least(damped, few)]] = True
+            chosen[:, evenly(gentle, few)] = True
         at = np.nonzero(chosen)
         return rows[at[0]], width[at[1]], count[at[1]]
-
-    def _by_merits(
-        self,
-        state: BlockState,
-        kind: int,
-        pairs: tuple[Array, Index],
-        misses: Array,
-        few: int,
-    ) -> NDArray[np.bool_]:
-        """Of pairs the ``few`` cheapest that do, the nearest, the gentle that damp most, and some
-        of these.
-        """
-        channel, every = self.kinds[kind]
-        width, count = pairs
-        spent = acts(channel, width).on_time * count
-        gentle = np.flatnonzero(count <= GENTLE)
-        damped = misses
-        if not self.flights.damps:
-            damped = self.damping_misses(state, channel, every, width[gentle], count[gentle])
-        else:
-            damped = misses[:, gentle]
-        chosen = np.zeros(misses.shape, dtype=bool)
-        rows = np.arange(len(misses))[:, None]
-        in_order = np.where(complies(misses), spent / spent.max() - 2.0 + 1e-9 * misses, misses)
-        chosen[rows, least(in_order, few)] = True
-        chosen[rows, least(misses, few)] = True
-        chosen[rows, gentle[least(damped, few)]] = True
-        chosen[:, evenly(gentle, few)] = True
-        return chosen
-
-    def _part_way(self, state: BlockState, kind: int, width: Array, count: Index) -> Index:
-        """Pairs of three widths that go a part of the way to the target, or end at a blackout."""
-        channel, every = self.kinds[kind]
-        if self.spacecraft.goal.axis is None or not channel.transverse:
-            return np.zeros(0, dtype=np.intp)
-        way = float(np.max(self.model.course(state)[1]))
-        rows = list[Index]()
-        for size in evenly(self.widths[kind], 3).tolist():
-            step = float(self.model.turned_by(channel, size, self.spacecraft.spin))
-            numbers = [*np.linspace(0.0, 1.0, 13)[1:] * way / step]
-            to_dark = (self.dark[0][:WINDOWS] - float(np.min(state.sun_pulse))) / self.model.turn
-            numbers += [*np.floor(to_dark / every), *np.floor(to_dark / every) + 1.0]
-            at = np.flatnonzero(width == size)
-            nearest = np.abs(count[at][:, None] - np.clip(numbers, 1.0, count.max())).argmin(axis=0)
-            rows.append(at[nearest])
-        return np.unique(np.concatenate(rows))
 
     def beam(self, sequences: BlockSequences) -> BlockSequences:
         """The promising sequences, with the motion of their flights."""
@@ -347,13 +300,11 @@ class BlockSearch:
         *,
         last: bool,
         delays: Array | None = None,
-        off: BlockState | None = None,
     ) -> Iterator[BlockSequences]:
         """Blocks of ``pairs`` behind the rows ``before``, after ``waits``: of each pair the best
         two, or in whole searches all that may be of use.
 
-        ``delays`` s: default those that serve best. ``off``: by how much they end elsewhere than
-        the closed form says.
+        ``delays`` s: default those that serve best.
         """
         channel, every = self.kinds[kind]
         size = len(waits) * (self.last_delay + 1 if self.whole else 4)
@@ -365,7 +316,7 @@ class BlockSearch:
             best = self.delays(state, channel, trial) if delays is None else delays
             trial = trial._replace(delay=best)
             after = self.model.after(state, channel, trial)
-            residual = self.model.left(after if off is None else after.shifted(off))
+            residual = self.model.left(after)
             share = self.flights.share(residual)
             shape = np.broadcast_shapes((len(rows), len(waits), 1), np.shape(share))
             work.spend(LOOKED * math.prod(shape))
@@ -533,47 +484,44 @@ class BlockSearch:
     # --- flights
 
     def fly(self, sequences: BlockSequences) -> None:
-        """Fly what is promising: where the search is whole all that may comply, the cheapest first.
+        """Fly what is promising, batch by batch, as long as it may cost less than what complies:
+        where the search is whole all that may comply, the cheapest first.
 
         Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest
-        of many may not.
+        of many may not. Where the closed form errs by much, the cheapest that comply are far
+        behind.
         """
         share, cost = sequences.share, sequences.cost
-        ranked = sequences.ranked
-        clear = np.argsort(share, kind="stable")
-        if self.whole:
-            order = np.lexsort((share, cost, share > DOUBTFUL))
-            order = order[: max(int(np.sum(share <= DOUBTFUL)), 8 * FLOWN)]
-            for begin in range(0, len(order), 8 * FLOWN):
-                some = order[begin : begin + 8 * FLOWN]
-                if cost[some[0]] >= self.flights.cheapest * (1.0 - SAME_COST) or work.exhausted():
-                    break
-                self._fly(sequences, some)
-            return
-        self._fly(sequences, np.unique(np.concatenate([ranked[:8], clear[:4]])))
-        if work.exhausted():
-            return
         doubtful = np.lexsort((share, cost, share > DOUBTFUL))
-        largest = np.zeros(len(share))
-        for kind, (channel, _) in enumerate(self.kinds):
-            of_kind = np.flatnonzero(sequences.kind == kind)
-            turns = self.model.turned_by(channel, sequences.width[of_kind], self.spacecraft.spin)
-            largest[of_kind] = turns
-        some = clear[: 8 * FLOWN]
-        gentle = some[np.argsort(largest[some], kind="stable")]
-        mixed = np.array([each[:FLOWN] for each in (ranked, clear, gentle, doubtful)]).T.ravel()
-        _, index = np.unique(mixed, return_index=True)
-        rows = mixed[np.sort(index)]
-        self._fly(sequences, rows[cost[rows] < self.flights.cheapest * (1.0 - SAME_COST)])
-        # Where the closed form errs by much, the cheapest that comply are far behind.
-        doubtful = doubtful[FLOWN : BATCHES * FLOWN]
-        doubtful = doubtful[share[doubtful] <= DOUBTFUL]
-        for begin in range(0, len(doubtful), 2 * FLOWN):
-            some = doubtful[begin : begin + 2 * FLOWN]
-            some = some[cost[some] < self.flights.cheapest * (1.0 - SAME_COST)]
-            if not len(some) or work.exhausted():
+        some = int(np.sum(share <= DOUBTFUL))
+        if self.whole:
+            order = doubtful[: max(some, 8 * FLOWN)]
+        else:
+            largest = np.zeros(len(share))
+            for kind, (channel, _) in enumerate(self.kinds):
+                rows = np.flatnonzero(sequences.kind == kind)
+                turns = self.model.turned_by(channel, sequences.width[rows], self.spacecraft.spin)
+                largest[rows] = turns
+            clear = np.argsort(share, kind="stable")
+            gentle = clear[: 8 * FLOWN]
+            gentle = gentle[np.argsort(largest[gentle], kind="stable")]
+            ranked = sequences.ranked
+            mixed = np.array([each[:FLOWN] for each in (ranked, clear, gentle, doubtful)]).T.ravel()
+            rest = doubtful[FLOWN : min(BATCHES * FLOWN, some)]
+            order = np.concatenate([ranked[:8], clear[:4], mixed, rest])
+            order = order[np.sort(np.unique(order, return_index=True)[1])]
+        begin = 0
+        # A few at first: those of the others that cost more than one that complies are not flown.
+        size = 8 * FLOWN if self.whole else FIRST
+        while begin < len(order) and not (begin and work.exhausted()):
+            batch = order[begin : begin + size]
+            batch = batch[cost[batch] < self.flights.cheapest * (1.0 - SAME_COST)]
+            if len(batch):
+                self._fly(sequences, batch)
+            elif self.whole:
                 break
-            self._fly(sequences, some)
+            begin += size
+            size = 2 * FLOWN
 
     def _fly(self, sequences: BlockSequences, rows: Index) -> Index:
         """Fly rows, and return those that were: the first ones, if all have too many pulses."""
@@ -603,39 +551,3 @@ class BlockSearch:
             angle,
         )
         return (*self.blocks(sequences.before, int(sequences.parent[row])), block)
-
-    def neighbours(self) -> list[BlockSequences]:
-        """Blocks about as long and as late as those of the best flights, where the closed form errs
-        as it does for these.
-        """
-        channels = dict[tuple[str, ...], Blocks]()
-        for blocks in sorted(self.flights.of, key=lambda blocks: self.flights.of[blocks].rank):
-            channels.setdefault(tuple(block.channel for block in blocks), blocks)
-        near = list[BlockSequences]()
-        for blocks in list(channels.values())[:NEIGHBOURS]:
-            sequences, row = self.rows[blocks]
-            before, block = sequences.before, blocks[-1]
-            assert before is not None
-            kind, parent = int(sequences.kind[row]), sequences.parent[[row]]
-            end = self.flights.of[blocks].end[:, None]
-            off = self.model.apart(sequences.state.some(row), end)
-            channel = self.kinds[kind][0]
-            widths = self.widths[kind]
-            at = int(np.argmin(np.abs(widths - block.width)))
-            edges = widths[max(at - 3, 0)] - 1e-12, widths[min(at + 3, len(widths) - 1)] + 1e-12
-            closer = commandable_widths(self.commands, channel, *edges, count=WIDTHS)
-            widths = np.union1d(evenly(widths, WIDTHS), closer)
-            on_time = acts(channel, np.array([block.width])).on_time
-            counts = np.rint(block.count * on_time / acts(channel, widths).on_time)
-            counts = (counts[:, None] + np.arange(-2, 3)).clip(1, self.allowed).astype(int)
-            width = np.broadcast_to(widths[:, None], counts.shape).ravel()
-            pairs = np.repeat(parent, width.size), width, counts.ravel()
-            waits = np.arange(-1, 2) + block.first - self._following(before, parent)
-            waits = waits[waits >= (self.earliest if before.before is None else self.pause)]
-            delay = block.delay_at(self.spacecraft.spin)
-            delays = delay + np.arange(-3, 4) * self.commands.delay_step
-            parts = self.behind(
-                before, kind, pairs, waits, last=True, delays=self.commanded(delays), off=off
-            )
-            near.append(joined(before, list(parts)))
-        return near

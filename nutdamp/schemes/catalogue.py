@@ -183,6 +183,11 @@ class OptimalOptions(SchemeOptions):
             problem = "expected none beside a free axis, where H may end anywhere"
             raise SenselessOption("shift", as_given(self.shift), problem)
 
+    @property
+    def saves_cost(self) -> bool:
+        """True if the cost is to be least, not the time or the number of pulses."""
+        return self.least in LEAST[:2]
+
     def settled(self, *, keeps_axis: bool) -> Self:
         """Copy with the default freedom of H; a ``shift`` of 0 becomes None."""
         if self.shift is not None:

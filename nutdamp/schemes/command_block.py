@@ -10,7 +10,7 @@ planned on what they leave, one before them ahead by as much.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import accumulate
 
@@ -22,14 +22,14 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_flights import BlockFlights, FlownSequence
-from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
+from nutdamp.schemes.block_model import acts, spin_turn
 from nutdamp.schemes.block_search import BLOCKS, LONGEST, BlockSearch
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
-from nutdamp.spacecraft.equipment import ANGLE, Block, Channel
+from nutdamp.spacecraft.equipment import ANGLE, Block
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.roles import with_limits
@@ -40,69 +40,42 @@ AMPLE = 1.5  # multiple of the time of the fewest pulses that a change of the sp
 FLOWN_PULSES = 2000  # pulses that are flown, after which no further sequence is
 
 
-def scope_note(search: BlockSearch, chosen: FlownSequence) -> Note:
-    """Scope of the search, and flight against closed form."""
-    sequences, row = search.rows[chosen.schedule.blocks]
-    form = search.model.left(sequences.state.some(row))
-    flown = left_by(propagation.flown(search.spacecraft, chosen.schedule))
-    nutation, end = (
-        math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
-    )
-    figures = {"compared": search.looked, "nutation_deg": nutation, "end_deg": end}
-    if search.whole:
-        return note("blocks-compared", **figures)
-    return note("blocks-found", **figures)
-
-
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
-    """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
-    left = left_by(propagation.flown(search.spacecraft, chosen.schedule))
-    shares = search.flights.shares(left)
-    broken = [
-        bound for bound in search.flights.bounds if not requirements.complies(shares[bound.part])
-    ]
-    missed = {bound.part: bound.limit for bound in broken}
-    more = [note("more-blocks", blocks=BLOCKS)] * (len(chosen.schedule.blocks) == most < BLOCKS)
-    named = [
-        *more,
-        *too_coarse(search.model, search.channels, missed),
-        *used_up(search.spacecraft, chosen.schedule),
-    ]
-    return named or [note("finer-commands")]
+    """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less.
 
-
-def too_coarse(
-    model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float]
-) -> Iterator[Note]:
-    """Steps of the commands that may, half of each, cost more than the bounds that are ``missed``
-    (rad) allow.
+    Steps of the commands are among them that may, half of each, cost more than the bounds that are
+    missed allow.
     """
-    spacecraft, commands = model.spacecraft, model.spacecraft.commands
-    assert commands is not None
+    spacecraft, commands, model = search.spacecraft, search.commands, search.model
+    shares = search.flights.shares(left_by(propagation.flown(spacecraft, chosen.schedule)))
+    missed = {
+        bound.part: bound
+        for bound in search.flights.bounds
+        if not requirements.complies(shares[bound.part])
+    }
+    named = [note("more-blocks", blocks=BLOCKS)] * (len(chosen.schedule.blocks) == most < BLOCKS)
     way = spacecraft.to_turn if spacecraft.goal.axis is not None else 0.0
     half = 0.5 * commands.delay_step
-    spin, damped = abs(spacecraft.spin), abs(model.rate(spacecraft.spin))
-    aside = {
-        Part.DISTANCE: half * spin * way,
-        Part.NUTATION: half * damped * math.tan(spacecraft.nutation),
-    }
-    # The least by which pulses of neighbouring widths differ in turning H; none is a width too.
-    turned = [
-        model.turned_by(channel, commandable_widths(commands, channel), spacecraft.spin)
-        for channel in channels
-    ]
-    along = 0.5 * min(float(np.diff(np.sort(turns), prepend=0.0).min()) for turns in turned)
-    for part in (Part.DISTANCE, Part.NUTATION):
-        if aside[part] > missed.get(part, math.inf):
-            change = math.degrees(2.0 * aside[part])
-            yield note(
+    damped = abs(model.rate(spacecraft.spin)) * math.tan(spacecraft.nutation)
+    aside = {Part.DISTANCE: half * abs(spacecraft.spin) * way, Part.NUTATION: half * damped}
+    for part, angle in aside.items():
+        if part in missed and not missed[part].met(angle):
+            step = note(
                 "finer-delay-step",
                 delay_step_s=commands.delay_step,
                 part=requirements.POINTING if part is Part.DISTANCE else part.label,
-                change_deg=change,
+                change_deg=math.degrees(2.0 * angle),
             )
-    if along > min(missed.values(), default=math.inf):
-        yield note("finer-widths", change_deg=math.degrees(2.0 * along))
+            named.append(step)
+    # The least by which pulses of neighbouring widths differ in turning H; none is a width too.
+    turned = [
+        model.turned_by(channel, commandable_widths(commands, channel), spacecraft.spin)
+        for channel in search.channels
+    ]
+    along = 0.5 * min(float(np.diff(np.sort(turns), prepend=0.0).min()) for turns in turned)
+    if not all(bound.met(along) for bound in missed.values()):
+        named.append(note("finer-widths", change_deg=math.degrees(2.0 * along)))
+    return [*named, *used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
 
 
 def used_up(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Note]:
@@ -215,7 +188,15 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
             why = "the budget of work was used up before a block was found"
         raise Infeasible(why)
     chosen = flights.chosen()
-    notes = [scope_note(search, chosen)]
+    # Flight against closed form.
+    sequences, row = search.rows[chosen.schedule.blocks]
+    form = search.model.left(sequences.state.some(row))
+    flown = left_by(propagation.flown(spacecraft, chosen.schedule))
+    nutation, end = (
+        math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
+    )
+    figures = {"compared": search.looked, "nutation_deg": nutation, "end_deg": end}
+    notes = [note("blocks-compared" if search.whole else "blocks-found", **figures)]
     if not requirements.complies(chosen.rank[1]):
         notes += cures(search, chosen, most or BLOCKS)
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
@@ -280,10 +261,9 @@ def opposite_blocks(spacecraft: Spacecraft, most: int | None) -> FlownSequence |
 
 LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twice
 
+# Share of a bound that the turn may use up before the spin is changed, and the inverse for what
+# that may add.
 MARGIN = 0.97
-"""Share of a bound that the turn may use up before the spin is changed, and the inverse for what
-that may add.
-"""
 
 
 def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
@@ -306,17 +286,14 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
             for number in range(LEGS):
                 at_leg = legs.at_leg
                 turning = turns == (number % 2 == 0)
-                leg = (
-                    turn_leg(spacecraft, at_leg)
-                    if turning
-                    else spin_leg(spacecraft, at_leg, aim if number < 2 else goal)
-                )
+                spin = aim if number < 2 else goal
+                due = leg(spacecraft, at_leg, None if turning else spin)
                 room = None if most is None else most - len(legs.blocks) - (number == 0)
-                if leg is None or (room is not None and room < 1):
+                if due is None or (room is not None and room < 1):
                     continue
                 try:
-                    best = None if turning else opposite_blocks(leg, room)
-                    legs.fire((best or _searched(leg, room)).schedule)
+                    best = None if turning else opposite_blocks(due, room)
+                    legs.fire((best or _searched(due, room)).schedule)
                 except Infeasible:
                     if number < 2:
                         raise
@@ -336,90 +313,52 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     return flights.best()
 
 
-def _at_end(spacecraft: Spacecraft) -> tuple[float, float | None]:
-    """Bounds of nutation and momentum axis, rad; None where H may end anywhere."""
-    bounds = {bound.part: bound.limit for bound in requirements.bounds(spacecraft)}
-    return bounds[Part.NUTATION], bounds.get(requirements.aim(spacecraft))
-
-
-def turn_leg(spacecraft: Spacecraft, at_leg: Spacecraft) -> Spacecraft | None:
-    """Spacecraft of a leg that turns or damps, with room for the change of spin that is to
-    follow; None where nothing is to be done.
+def leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float | None) -> Spacecraft | None:
+    """Spacecraft of a leg with its own goal and requirement: one that brings the spin to ``aim``
+    rad/s, on channels that do that alone, or else turns or damps, with room for the change of spin
+    that is to follow. None where nothing is to be done.
     """
-    goal = spacecraft.goal.spin
+    goal, commands = spacecraft.goal.spin, at_leg.commands
     assert goal is not None
-    nutation, shift = _at_end(spacecraft)
-    if at_leg.nutation <= nutation and (shift is None or at_leg.to_turn <= shift):
-        return None
-    horizon = at_leg.horizon
-    if not requirements.spins_at(at_leg, goal):
-        nutation *= MARGIN * _slower(spacecraft, at_leg)
-        shift = None if shift is None else MARGIN * shift
-        horizon = max(horizon - _least_time(at_leg, goal), 0.5 * horizon)
-    return _leg(spacecraft, at_leg, None, (nutation, shift), horizon)
-
-
-def spin_leg(spacecraft: Spacecraft, at_leg: Spacecraft, aim: float) -> Spacecraft | None:
-    """Spacecraft of a leg that brings the spin to ``aim`` rad/s, on channels that do that
-    alone; None where it is there.
-    """
-    if requirements.spins_at(at_leg, aim):
-        return None
-    nutation, shift = _at_end(spacecraft)
-    nutation = max(at_leg.nutation / _slower(spacecraft, at_leg) / MARGIN, nutation)
-    shift = None if shift is None else max(at_leg.to_turn / MARGIN, shift)
-    spinning = tuple(channel for channel in at_leg.channels if not channel.damps)
-    at_leg = replace(at_leg, channels=spinning)
-    return _leg(spacecraft, at_leg, aim, (nutation, shift), at_leg.horizon)
-
-
-def _slower(spacecraft: Spacecraft, at_leg: Spacecraft) -> float:
-    """Share of |H3| that a change of spin leaves: the nutation opens by its inverse."""
-    assert spacecraft.goal.spin is not None
-    share = abs(float(spacecraft.inertia.axial(spacecraft.goal.spin)) / at_leg.axial)
-    return min(max(share, SLOWEST), 1.0)
-
-
-def _leg(
-    spacecraft: Spacecraft,
-    at_leg: Spacecraft,
-    spin: float | None,
-    bounds: tuple[float, float | None],
-    horizon: float,
-) -> Spacecraft:
-    """Spacecraft of a leg, with its own goal and requirement, and steps of angle as at t = 0."""
-    commands = at_leg.commands
     assert commands is not None
-    if commands.delay_is == ANGLE:
+    bounds = {bound.part: bound for bound in requirements.bounds(spacecraft)}
+    damped, aimed = bounds[Part.NUTATION], bounds.get(requirements.aim(spacecraft))
+    nutation = damped.limit
+    shift = None if aimed is None else aimed.limit
+    horizon, channels = at_leg.horizon, at_leg.channels
+    # Share of |H3| that a change of spin leaves: the nutation opens by its inverse.
+    share = abs(float(spacecraft.inertia.axial(goal)) / at_leg.axial)
+    slower = min(max(share, SLOWEST), 1.0)
+    if aim is not None:
+        if requirements.spins_at(at_leg, aim):
+            return None
+        nutation = max(at_leg.nutation / slower / MARGIN, nutation)
+        shift = None if shift is None else max(at_leg.to_turn / MARGIN, shift)
+        channels = tuple(channel for channel in channels if not channel.damps)
+    elif damped.met(at_leg.nutation) and (aimed is None or aimed.met(at_leg.to_turn)):
+        return None
+    elif not requirements.spins_at(at_leg, goal):
+        nutation *= MARGIN * slower
+        shift = None if shift is None else MARGIN * shift
+        change = goal - at_leg.spin
+        strongest = 0.0
+        for channel in channels:
+            on_times = acts(channel, commandable_widths(commands, channel)).on_time
+            longest = math.copysign(np.max(on_times, initial=0.0), change)
+            strongest = max(strongest, channel.axial * longest)
+        if strongest > 0.0:
+            pulses = 2.0 + AMPLE * abs(change) * at_leg.inertia.C / strongest
+            horizon = max(horizon - pulses * spin_turn(at_leg), 0.5 * horizon)
+    if commands.delay_is == ANGLE:  # steps of angle as at t = 0
         longer = abs(spacecraft.spin / at_leg.spin)
-        commands = replace(
-            commands,
-            delay_step=commands.delay_step * longer,
-            delay_max=commands.delay_max * longer,
-        )
-    axis = None if bounds[1] is None else at_leg.goal.axis
+        step, most = commands.delay_step * longer, commands.delay_max * longer
+        commands = replace(commands, delay_step=step, delay_max=most)
+    axis = None if shift is None else at_leg.goal.axis
     return replace(
         at_leg,
-        goal=replace(at_leg.goal, axis=axis, spin=spin),
+        channels=channels,
+        goal=replace(at_leg.goal, axis=axis, spin=aim),
         commands=commands,
-        requirement=Requirement(*bounds),
+        requirement=Requirement(nutation, shift),
         limits=replace(at_leg.limits, horizon=horizon),
-    )
-
-
-def _least_time(spacecraft: Spacecraft, spin: float) -> float:
-    """Time, s, that a change to ``spin`` rad/s takes, with some to spare; 0 where no channel gives
-    it.
-    """
-    most = 0.0
-    commands = spacecraft.commands
-    change = spin - spacecraft.spin
-    assert commands is not None
-    for channel in spacecraft.channels:
-        on_times = acts(channel, commandable_widths(commands, channel)).on_time
-        most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
-    return (
-        (2.0 + AMPLE * abs(change) * spacecraft.inertia.C / most) * spin_turn(spacecraft)
-        if most > 0.0
-        else 0.0
     )

@@ -64,19 +64,17 @@ ALIGNED = 1e-9
 # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
 FADED = 1e-6
 
+# Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
+# given length so many before the equal ones, which damp the nutation, and at the end.
 MOVED, BEFORE, AFTER = 8, 12, 24
-"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
-given length so many before the equal ones, which damp the nutation, and at the end.
-"""
 
 EXACT = (
     1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
 )
 
+# Factors of cost and miss within which candidates count as equal: of those the one that ends first
+# is preferred.
 CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
-"""Factors of cost and miss within which candidates count as equal: of those the one that ends first
-is preferred.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +132,18 @@ def model_of(
     ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle
     may be of any size. ``three_moments``: the model has those of the spacecraft.
     """
-    undisturbed = _without_steady(spacecraft)
+    undisturbed = spacecraft
+    if spacecraft.disturbances:  # ω counts from the steady response to those that last
+        steady = steady_omega(spacecraft, 0.0)
+        beaten = (
+            replace(each, transverse=0j) if settles(spacecraft, each) else each
+            for each in spacecraft.disturbances
+        )
+        undisturbed = replace(
+            spacecraft,
+            omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
+            disturbances=tuple(each for each in beaten if each.axial or each.transverse),
+        )
     inertia = spacecraft.inertia
     if inertia.symmetric or three_moments:
         return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
@@ -191,26 +200,6 @@ def _aimed(symmetric: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
     middle = (before + after) / float(np.linalg.norm(before + after))
     axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
     return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
-
-
-def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
-    """Spacecraft with ω counted from the steady response to its disturbances; those without one
-    stay.
-    """
-    if not spacecraft.disturbances:
-        return spacecraft
-    steady = steady_omega(spacecraft, 0.0)
-    left = (
-        replace(each, transverse=0j) if settles(spacecraft, each) else each
-        for each in spacecraft.disturbances
-    )
-    return replace(
-        spacecraft,
-        omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
-        disturbances=tuple(
-            disturbance for disturbance in left if disturbance.axial or disturbance.transverse
-        ),
-    )
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
@@ -490,27 +479,36 @@ def _size(pulse: Pulse) -> float:
     return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
 
 
-def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[], bool]) -> Vector:
+def solve(
+    residual: Callable[[Vector], Vector],
+    free: Vector,
+    enough: Callable[[], bool],
+    slopes: Callable[[Vector, Vector], Vector] | None = None,
+) -> Vector:
     """Unknowns (n,) that make ``residual`` (m,) least in norm.
 
     ``free`` (n, 4): start, natural size and bounds of each. With more unknowns than equations the
-    nearest solution. It is left as it is once there was ``enough`` work.
+    nearest solution. It is left as it is once there was ``enough`` work. ``slopes`` of unknowns and
+    their residual, (m, n) in natural sizes, are asked for once, and corrected at each step (Broyden
+    1965); without them they are differences of residuals at every step.
     """
     start, scale, lower, upper = free.T
     difference = 1e-6  # in scaled unknowns: the error of the slopes, far below their size
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
+    jacobian = None if slopes is None or norm <= CONVERGED else slopes(x, value)
     for _ in range(STEPS):
         if norm <= CONVERGED or enough():
             break
-        columns = [
-            (residual(x + moved) - value) / difference for moved in np.diag(difference * scale)
-        ]
-        step = bounded_step(np.column_stack(columns), value, x, scale, lower, upper)
-        before = norm
+        if slopes is None:
+            moved = x + np.diag(difference * scale)
+            jacobian = np.column_stack([(residual(each) - value) / difference for each in moved])
+        assert jacobian is not None
+        step = bounded_step(jacobian, value, x, scale, lower, upper)
+        before, last, last_value = norm, x, value
         for shrink in range(8):
-            trial = np.clip(x + step * 0.5**shrink, lower, upper)
+            trial = np.clip(last + step * 0.5**shrink, lower, upper)
             trial_value = residual(trial)
             trial_norm = float(np.linalg.norm(trial_value))
             if trial_norm < before:
@@ -518,6 +516,10 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
                 break
         if norm > before * (1.0 - PROGRESS):
             break
+        if slopes is not None:
+            change = (x - last) / scale
+            wrong = value - last_value - jacobian @ change
+            jacobian = jacobian + np.outer(wrong, change) / (change @ change)
     return np.asarray(x)
 
 

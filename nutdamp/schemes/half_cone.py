@@ -166,15 +166,45 @@ def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
     # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it,
     # N m s.
     equal = min((at_leg.to_turn + at_leg.nutation) / (2 * cones), 1.0)
-    nominal = abs(at_leg.axial) * (math.tan(at_leg.nutation) + math.tan(equal))
+    h = abs(at_leg.axial)
+    nominal = h * (math.tan(at_leg.nutation) + math.tan(equal))
+    reach = _reach(at_leg)
+    sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
+    strongest = max((abs(each.transverse) for each in channels), default=0.0)
+    widest = 0.999 * precession.reach(strongest, at_leg.spin, math.inf)
+
+    def spent(jumps: Vector) -> Vector:
+        """Impulse (n,) N m s of later ``jumps`` (n,), with their widths as that of the first."""
+        reached = np.minimum(jumps, widest)
+        return strongest * precession.on_times_to_turn(reached, strongest, at_leg.spin)
+
     choices: list[tuple[Vector, Vector, Channel]] = []
     work.spend(PLACE * count * len(channels))
     for channel in channels:
-        direction = channel.transverse / abs(channel.transverse)
+        torque = abs(channel.transverse)
+        direction = channel.transverse / torque
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
-        costs, on_times = _costs(at_leg, channel, push, cones, equal, nominal)
-        costs[~windows.allowed(times - 0.5 * on_times, on_times, at_leg.limits.earliest)] = np.inf
-        choices.append((costs, on_times, channel))
+        # Cost of the row, N m s, that begins at each moment, and on-time of its first pulse, s.
+        best, on_times = np.full(count, np.inf), np.zeros(count)
+        lasting = precession.on_times_to_turn(sizes, torque, at_leg.spin)
+        for size, on_time in zip(sizes.tolist(), lasting.tolist(), strict=True):
+            if not channel.min_on_time <= on_time <= channel.max_on_time:
+                continue
+            momentum = at_leg.momentum + size * push
+            half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
+            apart = attitude.angle_between(momentum, at_leg.target_axis)
+            rest = np.abs(apart - half_angle) / (2 * (cones - 1))
+            ahead, last = h * np.tan(half_angle), h * np.tan(rest)
+            costs = torque * on_time + spent(ahead + last) + spent(last)
+            costs += (cones - 2) * spent(2.0 * last)
+            # Cones may differ by so much for a channel to be in phase, but the last must not have
+            # too much to do.
+            unlike = np.abs(half_angle - equal) > UNEQUAL * equal
+            costs[unlike | (rest > LAGGING * equal) | (ahead + last > 1.02 * reach)] = np.inf
+            better = costs < best
+            best[better], on_times[better] = costs[better], on_time
+        best[~windows.allowed(times - 0.5 * on_times, on_times, at_leg.limits.earliest)] = np.inf
+        choices.append((best, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
     if not math.isfinite(least):
         names = ", ".join(channel.name for channel in channels)
@@ -189,48 +219,3 @@ def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
         for row in np.flatnonzero(costs <= near)[:1]
     ]
     return commandable(at_leg, min(pulses, key=lambda choice: (choice[1].end, choice[0]))[1])
-
-
-def _costs(
-    at_leg: Spacecraft, channel: Channel, push: Vector, cones: int, equal: float, nominal: float
-) -> tuple[Vector, Vector]:
-    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the
-    on-time of that, s.
-    """
-    h = abs(at_leg.axial)
-    reach = _reach(at_leg)
-    best = np.full(len(push), np.inf)
-    chosen = np.zeros(len(push))
-    sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
-    on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), at_leg.spin)
-    strongest = max(abs(each.transverse) for each in usable(at_leg))
-    widest = 0.999 * precession.reach(strongest, at_leg.spin, math.inf)
-
-    def spent(jumps: Vector) -> Vector:
-        """Impulse (n,) N m s of later ``jumps`` (n,), with their widths as that of the first."""
-        return strongest * precession.on_times_to_turn(
-            np.minimum(jumps, widest), strongest, at_leg.spin
-        )
-
-    for size, on_time in zip(sizes.tolist(), on_times.tolist(), strict=True):
-        if not channel.min_on_time <= on_time <= channel.max_on_time:
-            continue
-        momentum = at_leg.momentum + size * push
-        half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
-        rest = np.abs(attitude.angle_between(momentum, at_leg.target_axis) - half_angle) / (
-            2 * (cones - 1)
-        )
-        ahead, last = h * np.tan(half_angle), h * np.tan(rest)
-        costs = (
-            abs(channel.transverse) * on_time
-            + spent(ahead + last)
-            + (cones - 2) * spent(2.0 * last)
-            + spent(last)
-        )
-        # Cones may differ by so much for a channel to be in phase, but the last must not have too
-        # much to do.
-        costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
-        costs[ahead + last > 1.02 * reach] = np.inf
-        better = costs < best
-        best[better], chosen[better] = costs[better], on_time
-    return best, chosen

@@ -4,8 +4,8 @@ lists them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 
@@ -16,15 +16,11 @@ from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, Scheme
 from nutdamp.schemes.correction import Correction, SymmetricModel, left, model_of
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import instance
 
 # rad that a schedule laid on the symmetric body leaves from which one is laid on the true motion
 MODELLED = 1e-6
-
-# multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
-LONGER = 4.0
 
 Choice = (
     Options | SchemeOptions | None
@@ -80,10 +76,15 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     try:
         whole = planned(model.symmetric, chosen)
     except TooShort as short:
+        from nutdamp.schemes.sequential import longer_horizon  # no plan
+
+        def attempt(limited: Spacecraft) -> Schedule | None:
+            with suppress(Infeasible):
+                return planned(limited, chosen)
+            return None
+
         with work.cure("a longer horizon"):
-            cure = short.cure or _longer_horizon(
-                model.symmetric, lambda limited: planned(limited, chosen)
-            )
+            cure = short.cure or longer_horizon(model.symmetric, attempt).text
         raise TooShort(short.why, cure) from None
     made = _corrected(scheme, model, whole, chosen)
     unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
@@ -96,29 +97,6 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     other = Correction(scheme, chosen)(spacecraft, on_true)
     less = left(spacecraft, other, momentum=False) < remains
     return other if less and keeps_limits(spacecraft, other.pulses) else made
-
-
-def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
-    """Message on a horizon that suffices, or that none was found; empty where the budget of work
-    ends before.
-    """
-
-    def end(horizon: float) -> float | None:
-        """End of the schedule within a horizon; None where there is none."""
-        try:
-            return planned(with_limits(spacecraft, horizon=horizon)).end
-        except Infeasible:
-            return None
-
-    usual = with_limits(spacecraft, horizon=None).horizon
-    for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
-        over = end(horizon) if horizon > spacecraft.horizon and not work.exhausted() else None
-        if over:
-            step = 10.0 ** (math.floor(math.log10(over)) - 3)
-            shortest = math.ceil(over / step) * step  # four digits, rounded up
-            needed = shortest if end(shortest) is not None else horizon
-            return f"limits.horizon = {needed:.4g} s is long enough"
-    return "" if work.exhausted() else f"not even limits.horizon = {horizon:.4g} s is long enough"
 
 
 def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> list[Schedule]:

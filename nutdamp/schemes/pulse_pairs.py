@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,22 +182,23 @@ class SteerablePair:
         if not np.isfinite(least):
             raise Infeasible(self.no_room(1))
         choice = self._best(times, np.zeros(len(times)), straight, FURTHER_TURNS)
-        if (choice is None or choice.cost > least * (1.0 + 1e-6)) and not straight:
+        if choice[0] > least * (1.0 + 1e-6) and not straight:
             # The limits forbid the best place: others beside it, by shares of both jumps.
             some = slice(None, None, math.ceil(len(times) / MOST_BESIDE))
             shares = np.linspace(-1.0, 1.0, 41)
             beside = np.repeat(times[some], len(shares)), (shares * free.cost[some, None]).ravel()
             other = self._best(*beside, straight, FURTHER_BESIDE)
-            if other is not None and (choice is None or other.cost < choice.cost * (1.0 - EQUAL)):
+            if other[0] < choice[0] * (1.0 - EQUAL):
                 choice = other
-        if choice is None:
+        cost, place, further, size = choice
+        if math.isinf(cost):
             raise Infeasible(self.no_room(1))
         point = _descend(
-            lambda points: self._costs(points[:, 0], points[:, 1], choice.further, straight)[0],
-            choice.point,
-            np.array([self.step, 0.0 if straight else 0.02 * choice.jumps]),
+            lambda points: self._costs(points[:, 0], points[:, 1], further, straight)[0],
+            place,
+            np.array([self.step, 0.0 if straight else 0.02 * size]),
         )
-        _, second, jumps = self._costs(point[:1], point[1:], choice.further, straight)
+        _, second, jumps = self._costs(point[:1], point[1:], further, straight)
         return self.pulses(
             [(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)]
         )
@@ -227,19 +227,25 @@ class SteerablePair:
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
-    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Placement | None:
-        """Cheapest choice with up to ``most`` further turns, of equal ones the first to end."""
-        best: _Placement | None = None
+    def _best(
+        self, times: Vector, aside: Vector, straight: bool, most: int
+    ) -> tuple[float, Vector, int, float]:
+        """Cheapest choice with up to ``most`` further turns, of equal ones the first to end.
+
+        Its cost, infinite where there is none; moment of the first pulse, s, and how far aside H
+        goes, N m s; further turns, and size of both jumps.
+        """
+        best = math.inf, np.zeros(2), 0, 0.0
         for further in range(most):
             costs, second, jumps = self._costs(times, aside, further, straight)
             least = float(costs.min())
-            if np.isfinite(least) and (best is None or least < best.cost * (1.0 - EQUAL)):
+            if np.isfinite(least) and least < best[0] * (1.0 - EQUAL):
                 near = np.flatnonzero(costs <= least * (1.0 + EQUAL))
                 index = near[np.argmin(second[near])]
                 point = np.array([times[index], aside[index]])
-                best = _Placement(least, point, further, float(jumps.cost[index]))
+                best = least, point, further, float(jumps.cost[index])
             if not (second < self.windows.horizon).any() or (
-                best is not None and not self.spacecraft.limits.blackout
+                best[0] < math.inf and not self.spacecraft.limits.blackout
             ):
                 break
         return best
@@ -270,13 +276,6 @@ class SteerablePair:
         )
 
 
-class _Placement(NamedTuple):
-    cost: float
-    point: Vector  # moment of the first pulse, s, and how far aside H goes, N m s
-    further: int
-    jumps: float
-
-
 def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> Vector:
     """Least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass search narrowing
     from ``steps`` (k,).
@@ -301,10 +300,8 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
 
 DEAREST = 3.0  # pairs that cost more than this times the floor are not looked at
 
+# Moments looked at in each turn of the body, and turns within which the first pulse comes, at most.
 BODY_SAMPLES, BODY_TURNS = 96, 24
-"""Moments looked at in each turn of the body, and turns within which the first pulse comes, at
-most.
-"""
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:

@@ -54,10 +54,9 @@ OTHERS = 4  # other lengths of the pulses that are tried where the one requested
 
 STEP = math.radians(2.0)  # angle that one ideal impulse turns H by, at most
 
+# Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that
+# has no hope.
 CLOSED, OPEN = 0.3, 1.2
-"""Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that
-has no hope.
-"""
 
 MOST_PULSES = 600
 
@@ -326,22 +325,9 @@ class Train:
         if at_leg is not self.at_leg:  # no two in the same passage of the phase
             turn = self.turn / self.options.per_turn
             ready = max(ready, (0.5 * turn if self.channels else turn) - on_time)
-        if self.channels:
-            return self._passing(at_leg, ahead, on_time, ready)
-        start = Windows(at_leg).earliest_start(on_time, ready)
-        if start is None:
-            return None
-        centre = start + 0.5 * on_time
-        assert at_leg.torquer is not None
-        angle = cmath.phase(_in_body(at_leg, ahead, centre))
-        return steerable_pulse(at_leg.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
-
-    def _passing(
-        self, at_leg: Spacecraft, ahead: Vector, on_time: float, ready: float
-    ) -> Pulse | None:
-        """First firing of a channel at the required phase within the limits."""
         windows = Windows(at_leg)
-        for _ in range(MOST_PULSES):
+        # The first firing of a channel at the required phase within the limits.
+        for _ in range(MOST_PULSES if self.channels else 0):
             moments = [
                 (_aligned(at_leg, channel, ahead, ready + 0.5 * on_time), channel)
                 for channel in self.channels
@@ -354,7 +340,13 @@ class Train:
             if free is None and start >= at_leg.limits.earliest - 1e-9:
                 return channel_pulse(channel, start + 0.5 * on_time, on_time)
             ready = max(free or 0.0, start + 0.25 * self.turn)
-        return None
+        begin = windows.earliest_start(on_time, ready)
+        if self.channels or begin is None:
+            return None
+        centre = begin + 0.5 * on_time
+        assert at_leg.torquer is not None
+        angle = cmath.phase(_in_body(at_leg, ahead, centre))
+        return steerable_pulse(at_leg.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
 
     def _in_phase(self, fewest: int, most: int) -> Infeasible:
         """Error where trains of ``fewest`` to ``most`` pulses leave nutation."""
@@ -431,8 +423,8 @@ def _ratio(whole: float, part: float) -> float:
     return whole / part if whole < 1e9 * part else 1e9
 
 
+# rad of flown residual that count as nothing, and relative saving that is worth more pulses.
 EXACT, CLEARLY = 1e-10, 0.01
-"""rad of flown residual that count as nothing, and relative saving that is worth more pulses."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:

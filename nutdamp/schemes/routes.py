@@ -23,18 +23,16 @@ from nutdamp.schemes.valve_commands import Legs
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
+# rad by which a route keeps clear of the cones.
 MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
-"""rad by which a route keeps clear of the cones."""
 
+# rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest
+# first.
 BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sign in (1.0, -1.0))
-"""rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest
-first.
-"""
 
+# Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of
+# parts of each leg.
 PLACES, PARTS = ((), (0.5,), (0.25, 0.75)), (1, 2, 4)
-"""Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of
-parts of each leg.
-"""
 
 ROUTES = 16  # routes that are tried, at most
 STEPS = 64  # points of a leg at which the cones are looked at
@@ -76,9 +74,19 @@ def schedules(
 def routes(spacecraft: Spacecraft) -> list[Route]:
     """Way points from H at t = 0, the target last, at most `ROUTES`; the shortest first."""
     start = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
+    target = spacecraft.target_axis
+    normal = np.cross(start, target)
+    size = float(np.linalg.norm(normal))
+    left = normal / size if size > 0.0 else attitude.square_to(start)
     shortest: dict[tuple[float, ...], Route] = {}
     for parts, margin, places in product(PARTS, MARGINS, PLACES):
-        bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
+        on_the_way = [_along(start, target, np.array([place]))[0] for place in places]
+        bends = (  # the least bent route that is clear
+            (*(math.cos(bend) * point + math.sin(bend) * left for point in on_the_way), target)
+            for bend in (BENDS if places else BENDS[:1])
+        )
+        clear = (route for route in bends if _clear((start, *route), spacecraft.keep, margin))
+        bent = next(clear, None)
         if bent is not None and len(bent) * parts > 1:
             shares = np.arange(1, parts + 1) / parts
             route = tuple(
@@ -92,23 +100,6 @@ def routes(spacecraft: Spacecraft) -> list[Route]:
 
 def _length(corners: Route) -> float:
     return math.fsum(float(attitude.angle_between(*leg)) for leg in pairwise(corners))
-
-
-def _bent(
-    start: Vector, target: Vector, places: tuple[float, ...], keeps: Sequence[Keep], margin: float
-) -> Route | None:
-    """Least bent route with way points at ``places`` that is clear by ``margin`` rad; None where
-    there is none.
-    """
-    on_the_way = [_along(start, target, np.array([place]))[0] for place in places]
-    normal = np.cross(start, target)
-    size = float(np.linalg.norm(normal))
-    left = normal / size if size > 0.0 else attitude.square_to(start)
-    for bend in BENDS if places else BENDS[:1]:
-        route = (*(math.cos(bend) * point + math.sin(bend) * left for point in on_the_way), target)
-        if _clear((start, *route), keeps, margin):
-            return route
-    return None
 
 
 def _along(start: Vector, end: Vector, shares: Vector) -> Vector:

@@ -30,10 +30,9 @@ MISSED = 50
 # only
 CORRECTED = 1e-4
 
+# Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be
+# planned and flown.
 MOST_PULSES = 2000
-"""Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be
-planned and flown.
-"""
 
 
 class ImpulseBuilder:
@@ -336,14 +335,13 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     return listed([name for name in there if there[name]])
 
 
+# Multiple of the horizon up to which a sufficient one is sought, where the default one is not
+# longer; halvings of the last doubling: the one that is named is at most an eighth of it too long.
 LATEST, BISECTIONS = 64.0, 3
-"""Multiple of the horizon up to which a sufficient one is sought, where the default one is not
-longer; halvings of the last doubling: the one that is named is at most an eighth of it too long.
-"""
 
 FREE_LIMITS = {"earliest": 0.0, "blackout": (), "gap": 0.0, "tick": None, "max_pulses": None}
+# Keys of limits of a file and of its thrusters, with the values that limit nothing.
 FREE_ON_TIMES = {"min_on_time": 0.0, "max_on_time": math.inf}
-"""Keys of limits of a file and of its thrusters, with the values that limit nothing."""
 
 
 class Cure(NamedTuple):
@@ -371,25 +369,34 @@ def why(spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
             schedule = None if work.exhausted() else attempt(limited)
             if schedule is not None:
                 return Cure(name, f"without {name} there is a schedule of {len(schedule)} pulses")
-        low = high = spacecraft.horizon
-        latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
-        while high < latest and not work.exhausted():
-            low, high = high, float(f"{2.0 * high:.4g}")
-            if attempt(with_limits(spacecraft, horizon=high)) is None:
-                continue
-            for _ in range(BISECTIONS):
-                middle = float(f"{0.5 * (low + high):.4g}")
-                enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
-                low, high = (low, middle) if enough else (middle, high)
-            return Cure("horizon", f"limits.horizon = {high:.4g} s is long enough")
-        if work.exhausted():
-            return Cure("", "")
-    none = f"no single limit is the cause, and {LATEST:g} times the horizon does not help either"
-    return Cure("", none)
+        cure = longer_horizon(spacecraft, attempt)
+    if cure.limit or not cure.text:
+        return cure
+    return Cure("", f"no single limit is the cause, and {cure.text}")
 
 
+def longer_horizon(
+    spacecraft: Spacecraft, attempt: Callable[[Spacecraft], Schedule | None]
+) -> Cure:
+    """Cure of an ``attempt`` by a longer horizon, as in `why`."""
+    low = high = spacecraft.horizon
+    latest = max(LATEST * high, with_limits(spacecraft, horizon=None).horizon)
+    while high < latest and not work.exhausted():
+        low, high = high, float(f"{2.0 * high:.4g}")
+        if attempt(with_limits(spacecraft, horizon=high)) is None:
+            continue
+        for _ in range(BISECTIONS):
+            middle = float(f"{0.5 * (low + high):.4g}")
+            enough = attempt(with_limits(spacecraft, horizon=middle)) is not None
+            low, high = (low, middle) if enough else (middle, high)
+        return Cure("horizon", f"limits.horizon = {high:.4g} s is long enough")
+    return Cure(
+        "", "" if work.exhausted() else f"{LATEST:g} times the horizon does not help either"
+    )
+
+
+# Reason why a final spin cannot be had.
 NO_AXIAL = "no channel has a torque about axis 3, so no channel can set the spin; leave out --spin"
-"""Reason why a final spin cannot be had."""
 
 
 def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:

@@ -165,12 +165,28 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
             builder.fire(builder.steered(torquer, begin, half, on_time))
         return builder.pulses
 
-    waits = [number * halves.wait for number in turns]
-    starts = ((start, wait) for wait in waits for start in _starts(windows, on_times, wait))
-    best = next(
-        (pulses for pulses in itertools.starmap(pair, starts) if keeps_limits(spacecraft, pulses)),
-        None,
-    )
+    # Starts with which both find room, in order: at once, or as a window ends for either pulse.
+    earliest, tick = windows.limits.earliest, windows.limits.tick
+    ends = np.array([end for _, end in windows.limits.blackout])
+    best: list[Pulse] | None = None
+    for number in turns:
+        wait = number * halves.wait
+        to_second = wait + 0.5 * (on_times[0] - on_times[1])  # from start to start
+        tried = np.sort(np.concatenate([[earliest], ends, ends - to_second]))
+        starts = tried[tried >= earliest]
+        seconds = starts + to_second
+        if tick is not None:
+            starts = np.ceil((starts - 0.5 * TOUCHING) / tick) * tick
+            seconds = np.rint((starts + to_second) / tick) * tick
+        long, longer = (np.full(len(starts), on) for on in on_times)
+        allowed = windows.allowed(starts, long, earliest) & (
+            seconds > starts
+        )  # not on one tick, however long that is
+        allowed &= windows.allowed(seconds, longer, starts + long + windows.limits.gap)
+        pairs = (pair(start, wait) for start in starts[allowed].tolist())
+        best = next((pulses for pulses in pairs if keeps_limits(spacecraft, pulses)), None)
+        if best is not None:
+            break
     if best is None:
         raise Infeasible(
             f"the pulses must be {halves.wait:.4g} s apart, or an odd multiple of that, and "
@@ -181,27 +197,6 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return schedule
     return correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-
-
-def _starts(windows: Windows, on_times: list[float], wait: float) -> list[float]:
-    """Starts of the first pulse with which both find room, in order: at once, or as a window ends
-    for either pulse.
-    """
-    # from start to start
-    earliest = windows.limits.earliest
-    to_second = wait + 0.5 * (on_times[0] - on_times[1])
-    ends = np.array([end for _, end in windows.limits.blackout])
-    tried = np.sort(np.concatenate([[earliest], ends, ends - to_second]))
-    starts = tried[tried >= earliest]
-    tick = windows.limits.tick
-    starts = starts if tick is None else np.ceil((starts - 0.5 * TOUCHING) / tick) * tick
-    seconds = starts + to_second if tick is None else np.rint((starts + to_second) / tick) * tick
-    long, longer = (np.full(len(starts), on) for on in on_times)
-    allowed = windows.allowed(starts, long, earliest) & (
-        seconds > starts
-    )  # not on one tick, however long that is
-    allowed &= windows.allowed(seconds, longer, starts + long + windows.limits.gap)
-    return [float(start) for start in starts[allowed]]
 
 
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:

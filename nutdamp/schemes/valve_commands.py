@@ -49,10 +49,10 @@ PLANS = (
     6  # plans, at most, each with on-times that leave room for the weakest pulse of the one before
 )
 
+# Addition to the reasons of schemes, which know nothing of valves.
 EFFECTIVE = (
     " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
 )
-"""Addition to the reasons of schemes, which know nothing of valves."""
 
 
 def without_valves(

@@ -15,8 +15,10 @@ from support import reference
 from support.builders import aimed, cross, spinner
 
 from nutdamp.physics import attitude
+from nutdamp.physics.thruster import Trapezoid, Valve
 from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
 from nutdamp.spacecraft.model import Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
 
@@ -37,6 +39,30 @@ limits: {horizon: 1200 s}
 requirement: {nutation: 0.3 deg, momentum_shift: 0.1 deg}
 """
 """A spinner that is commanded by blocks, as a file."""
+
+
+def through(valve: Valve | None, body: Spacecraft) -> Spacecraft:
+    """The body with this valve on all its thrusters."""
+    channels = tuple(one if valve is None else one.of(valve=valve) for one in body.channels)
+    return replace(body, channels=channels)
+
+
+def swells(body: Spacecraft, made: Schedule) -> list[reference.Swell]:
+    """The thrust of commands through the valves of `Trapezoid`, from start and on-time as loaded
+    alone.
+    """
+    thrusts = list[reference.Swell]()
+    channels = {one.name: one for one in body.channels}
+    for pulse in made:
+        jet = channels[pulse.channel]
+        assert isinstance(jet.valve, Trapezoid)
+        assert pulse.torque is not None
+        times: dict[str, Any] = {"opening": jet.valve.open_delay, "closing": jet.valve.close_delay}
+        ramps: dict[str, Any] = {"rise": jet.valve.rise_time, "fall": jet.valve.fall_time}
+        thrusts += reference.through_valve(
+            pulse.loaded[0], pulse.loaded[1], pulse.torque, **times, **ramps
+        )
+    return thrusts
 
 
 def commanded(

@@ -13,7 +13,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ from nutdamp.schemes.catalogue import (
     SchemeOptions,
     TwoPulseOptions,
 )
-from nutdamp.schemes.correction import Correction, SymmetricModel, bounded_step, model_of
+from nutdamp.schemes.correction import Correction, SymmetricModel, model_of, solve
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
@@ -163,29 +163,18 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
 
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
-NEWTON_STEPS, CONVERGED = (
-    25,
-    1e-12,
-)  # for the lengths of burns, and the end error, over |H|, at which they end
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
+# Steps in which the earliest end by small angles is found: ends found to 0.1 % were up to 8 %
+# later, for the next of the shares added to it was taken then.
 HALVINGS = 10
+# Shares added to the earliest end by small angles that are tried in turn.
 LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
-"""Steps in which the earliest end by small angles is found, and shares added to it that are tried
-in turn.
-"""
 
 
-class Pieces(NamedTuple):
-    """Numbers ``which`` (n,) of channels that fire one after the other, -1 where none does, and for
-    how long, s.
-
-    ``off`` (2,) N m s is how far from the target H is to end, where it may.
-    """
-
-    which: NDArray[np.int_]
-    times: Vector
-    off: Vector
+# Numbers (n,) of channels that fire one after the other, -1 where none does; for how long, (n,) s;
+# how far from the target H is to end, where it may, (2,) N m s.
+Pieces = tuple[NDArray[np.int_], Vector, Vector]
 
 
 def earliest(problem: Problem) -> Schedule | None:
@@ -194,14 +183,16 @@ def earliest(problem: Problem) -> Schedule | None:
     """
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
     influence = small_angles(problem.spacecraft, problem.equations)
+
     if _pieces(problem, influence, horizon) is None:
         return None
     low, high = begin, horizon
     for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        enough = _pieces(problem, influence, middle) is not None
+        low, high = (low, middle) if enough else (middle, high)
         if work.exhausted():
             return None
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if _pieces(problem, influence, middle) else (middle, high)
     for share in LONGER:
         end = min(high + share * (high - begin), horizon)
         schedule = within(problem, end)
@@ -231,7 +222,7 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
-        burns = _burns(problem, pieces.which, pieces.times)
+        burns = _burns(problem, *pieces[:2])
         influence = along(problem.flown(burns), problem.equations, _slot(problem))
     return None
 
@@ -313,7 +304,7 @@ def _in_order(times: Vector, width: float, off: Vector) -> Pieces | None:
     if joined[-1][0] < 0:
         joined.pop()
     which, lengths = (np.array([part[at] for part in joined]) for at in (0, 1))
-    return Pieces(which, lengths, off) if joined else None
+    return (which, lengths, off) if joined else None
 
 
 def _burns(problem: Problem, which: NDArray[np.int_], times: Vector) -> Schedule:
@@ -356,20 +347,10 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
         settings = np.hstack([starts[:, firing], rows[:, firing]])
         return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
 
-    value = left(times[None])[0]
-    for _ in range(NEWTON_STEPS):
-        if np.linalg.norm(value) <= CONVERGED or work.exhausted():
-            break
-        slopes = (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
-        move = bounded_step(
-            slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most)
-        )
-        for shrink in range(6):
-            trial = np.clip(times + move * 0.5**shrink, 0.0, most)
-            following = left(trial[None])[0]
-            if np.linalg.norm(following) < np.linalg.norm(value):
-                break
-        else:
-            break
-        times, value = trial, following
+    def slopes(times: Vector, value: Vector) -> Vector:
+        return (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
+
+    bounds = np.zeros(len(times)), np.full(len(times), most)
+    free = np.column_stack([times, scale, *bounds])
+    times = solve(lambda times: left(times[None])[0], free, work.exhausted, slopes)
     return _burns(problem, which, times)

@@ -40,21 +40,18 @@ from nutdamp.spacecraft.constraints import free_windows, usable
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
+# Subdivisions of a span into quarters, to 1e-5 of a slot; parts of a slot in which a long gain is
+# summed.
 QUARTERINGS, PARTS = 9, 4
-"""Subdivisions of a span into quarters, to 1e-5 of a slot; parts of a slot in which a long gain is
-summed.
-"""
 
+# Factors by which prices are lowered for channels that are on for long. Solved with slots, they are
+# up to w²/8 + w²/24 too high in the middle of a slot of w rad, which adds up over very many
+# alignments; each factor gives a bound.
 LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
-"""Factors by which prices are lowered for channels that are on for long. Solved with slots, they
-are up to w²/8 + w²/24 too high in the middle of a slot of w rad, which adds up over very many
-alignments; each factor gives a bound.
-"""
 
+# Relative height of a price that is not worth a closer look, and share by which gains are lowered
+# and prices raised, so that no bound is too high by the rounding of sums.
 ENOUGH, ROUNDING = 1e-10, 1e-12
-"""Relative height of a price that is not worth a closer look, and share by which gains are lowered
-and prices raised, so that no bound is too high by the rounding of sums.
-"""
 
 
 class SmallAngles:

@@ -311,15 +311,13 @@ WHOLE, SHARES = (
     np.array([0.5, 0.2, 0.05, 0.01]),
 )  # of a step, where all of it does not help
 
+# Share of the cost at which the barrier of the bounds ends; relative error of the conditions for an
+# optimum at which a sequence is done.
 BARRIER, SETTLED = 1e-9, 1e-7
-"""Share of the cost at which the barrier of the bounds ends; relative error of the conditions for
-an optimum at which a sequence is done.
-"""
 
+# Share of the cost below which the next step's promise, the barrier and the misses are not worth
+# taking it; weight that keeps the multipliers finite where equations depend on one another.
 FLAT, PROXIMAL = 1e-5, 1e-9
-"""Share of the cost below which the next step's promise, the barrier and the misses are not worth
-taking it; weight that keeps the multipliers finite where equations depend on one another.
-"""
 
 
 class DescentState(NamedTuple):

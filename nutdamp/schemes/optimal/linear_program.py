@@ -112,10 +112,9 @@ def burns(
     return tuple(sorted(result, key=lambda burn: burn.t))
 
 
+# Slots in the faster of the turns at ω3 and at aω3, and of all channels: of a longer horizon no
+# more is seen.
 SLOTS, MOST_SLOTS = 64, 600_000
-"""Slots in the faster of the turns at ω3 and at aω3, and of all channels: of a longer horizon no
-more is seen.
-"""
 
 SOLVED, SLOT, COLUMN, LIMITED = (
     3.0,
@@ -124,22 +123,19 @@ SOLVED, SLOT, COLUMN, LIMITED = (
     0.06,
 )  # units of `work`: solution, slot, column, limited burn
 
+# Relative reduced cost below which a column cannot lower the cost any more, and that for the best
+# moment of a strong channel, which may lie close beside one taken.
 PRICE, PEAK = 1e-7, 1e-6
-"""Relative reduced cost below which a column cannot lower the cost any more, and that for the best
-moment of a strong channel, which may lie close beside one taken.
-"""
 
+# Columns taken in per round, the best priced first, and over one the share of all worth taking in
+# that is taken in while they do not supply what is needed.
 BEST, MANY = 250, 4
-"""Columns taken in per round, the best priced first, and over one the share of all worth taking in
-that is taken in while they do not supply what is needed.
-"""
 
 FIRST, ROUNDS = 400, 60  # columns to begin with, and rounds in which more are taken in
 
+# Coefficient below which an equation is not scaled up; share of what is needed below which an
+# on-time is none.
 TINIEST, SOME = 1e-6, 1e-12
-"""Coefficient below which an equation is not scaled up; share of what is needed below which an
-on-time is none.
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -498,17 +494,15 @@ class Program:
 Way = tuple[Literal["simplex", "ipm"], bool]
 SIMPLEX: Way = ("simplex", False)
 INTERIOR: Way = ("ipm", True)
+# Method and presolving: where the dual simplex loses its way, interior points, which do not know
+# the trouble, mostly find the solution. Presolving compares each unknown with all others: 75,000 in
+# two equations take 13 s, and 0.24 s without it (nutation of 89.9°, 64 times the horizon).
 INTERIOR_OF_MANY: Way = ("ipm", False)
-"""Method and presolving: where the dual simplex loses its way, interior points, which do not know
-the trouble, mostly find the solution. Presolving compares each unknown with all others: 75,000 in
-two equations take 13 s, and 0.24 s without it (nutation of 89.9°, 64 times the horizon).
-"""
 
+# Unknowns above which `INTERIOR_OF_MANY` comes first: a step of the dual simplex then passes
+# thousands of their bounds, at a time that grows with the square of their number, where interior
+# points take 0.4 s instead of 10 s for 75,000.
 LARGE = 10_000
-"""Unknowns above which `INTERIOR_OF_MANY` comes first: a step of the dual simplex then passes
-thousands of their bounds, at a time that grows with the square of their number, where interior
-points take 0.4 s instead of 10 s for 75,000.
-"""
 
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
 SMALL, NONZERO = (
@@ -640,10 +634,9 @@ CORNERS, FLAT = (
     1e-12,
 )  # looked at, at most, and share of the weight of one below which it is none
 
+# Distance from the goal, over all there is to do, that is none; share of it that proves it, despite
+# rounding.
 MET, BEYOND = 3e-8, 1e-6
-"""Distance from the goal, over all there is to do, that is none; share of it that proves it,
-despite rounding.
-"""
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:

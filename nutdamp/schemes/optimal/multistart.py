@@ -47,25 +47,22 @@ FOUND, EXACT = (
     1e-6,
     1e-10,
 )  # largest miss, over |H|, of ideal impulses, and of a flight through real widths
+# Shares of all there is to do below which a pulse may be left out, and is even where nothing makes
+# good for it.
 NEEDLESS, NOTHING = 1e-3, 1e-10
-"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes
-good for it.
-"""
 
 WIDE, MOST_KICKS = (
     0.25,
     24,
 )  # rad of the faster turn from which a pulse is first so many kicks, and the most of them
 
+# Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses;
+# the fewest.
 CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
-"""Barrier for a schedule that is nearly the cheapest nearby; steps of its descent, over its pulses;
-the fewest.
-"""
 
+# Barrier for one that has lost its way from there; share of the way off the target that H may end,
+# to begin with.
 APART, INSIDE = 1e-2, 0.98
-"""Barrier for one that has lost its way from there; share of the way off the target that H may end,
-to begin with.
-"""
 
 
 class Moments(NamedTuple):

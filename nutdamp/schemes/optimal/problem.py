@@ -33,10 +33,9 @@ from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_puls
 UNMET = 1e-7
 REPAIRS = 60  # rounds in which burns that break a limit are moved elsewhere
 
+# Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth a
+# search.
 THRIFT, GAIN = 0.004, 0.0005
-"""Shares of the least cost given away for fewer pulses, of many and of few: so little is not worth
-a search.
-"""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
@@ -168,15 +167,15 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
     return Schedule(tuple(pulses))
 
 
-LEFT = math.radians(
-    1e-6
-)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
+# largest nutation and distance from the target, rad, and spin error, as a share, of a plan: that of
+# two-pulse for despun-comsat, which costs least, leaves 8e-6 deg
+LEFT = math.radians(1e-5)
 
 # share by which a schedule costs less than the bound of small angles, that refutes the bound
 BEATEN = 0.005
 
+# Relative accuracy of a least time by small angles.
 SHARPEST = 1e-3
-"""Relative accuracy of a least time by small angles."""
 
 
 class Problem:
@@ -296,18 +295,20 @@ class Problem:
         """Cost of a schedule by the program's own prices."""
         return math.fsum(self.prices[pulse.channel] * pulse.on_time for pulse in schedule)
 
-    def worth(self, schedule: Schedule) -> float:
-        """Quantity to be least: the cost, or the number of pulses."""
-        return float(len(schedule)) if self.options.least == "pulses" else self.price(schedule)
+    def rank(self, schedule: Schedule) -> tuple[float, float]:
+        """Quantity to be least, the cost or the number of pulses; then the cost."""
+        price = self.price(schedule)
+        return (float(len(schedule)) if self.options.least == "pulses" else price, price)
 
-    def cheaper(self, known: Schedule | None, other: Schedule | None) -> Schedule | None:
-        """The cheaper of two schedules, of which there may be none; the known with fewer pulses
-        where that counts.
-        """
-        there = [schedule for schedule in (known, other) if schedule is not None]
-        return min(
-            there, key=lambda schedule: (self.worth(schedule), self.price(schedule)), default=None
-        )
+    def cheaper(self, *schedules: Schedule | None) -> Schedule | None:
+        """The cheaper of schedules, of which there may be none; the first of equal ones."""
+        present = [schedule for schedule in schedules if schedule is not None]
+        return min(present, key=self.rank, default=None)
+
+    def error(self, schedule: Schedule) -> float:
+        """End error of a schedule, rad, zero where it is as good as none."""
+        left = self.left(self.flown(schedule))
+        return 0.0 if left <= LEFT else left
 
     def left(self, flown: Flight) -> float:
         """Largest end error of a flight, rad: nutation, distance from the target, and spin as a

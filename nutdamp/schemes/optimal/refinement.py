@@ -25,24 +25,23 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
-from nutdamp.schemes.correction import bounded_step
+from nutdamp.schemes.correction import solve
 from nutdamp.spacecraft.constraints import Windows, longest_on_time, rooms
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 
+# Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still
+# resolves) is left of the nutation, or all is lost; even moments, besides the edges of pulses, at
+# which ω3 is read from a flight with it.
 MOST_GROWN, KNOTS = 14.0, 400
-"""Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still
-resolves) is left of the nutation, or all is lost; even moments, besides the edges of pulses, at
-which ω3 is read from a flight with it.
-"""
 
 # Steps in a turn by which small changes of a motion of three moments are followed, terms of each
 # one's exponential, the most steps, and units of `work` of each.
 STEPS, ORDERS, MOST_VARIED, VARIED = 32, 10, 300_000, 0.004
 
 
+# Directions (2, n) in which H may end off the target, where it may.
 AROUND: Vector = np.array([part(2 * math.pi / 32 * np.arange(32)) for part in (np.cos, np.sin)])
-"""Directions (2, n) in which H may end off the target, where it may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,18 +302,13 @@ def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
     return rows
 
 
+# Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one
+# model; models.
 REACH, TICK_STEPS, MODELS = 2.0, 300, 4
-"""Ticks that a setting may lie from its exact value; steps of a tick, two pulses at a time, by one
-model; models.
-"""
 
 WAYS = np.array(
     [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]
 )  # a step: of the start, of the on-time
-CONVERGED, NEWTON_STEPS = (
-    1e-13,
-    25,
-)  # share of |H| left: a few roundings of the flight; steps to it, at most
 
 
 class Refinement:
@@ -373,26 +367,12 @@ class Refinement:
 
     def refined(self) -> Schedule:
         """The schedule that leaves least; how little is for the caller to judge."""
-        x = self.start
-        value = self.left(self.flight)
-        slopes = self.slopes(self.flight)
-        for _ in range(NEWTON_STEPS):
-            norm = float(np.linalg.norm(value))
-            if norm <= CONVERGED:
-                break
-            move = bounded_step(slopes, value, x, self.scale, self.lower, self.upper)
-            for shrink in range(5):
-                trial = np.clip(x + move * 0.5**shrink, self.lower, self.upper)
-                following = self.left(self.fly(self.schedule(trial)))
-                if np.linalg.norm(following) < norm:
-                    break
-            moved = (trial - x) / self.scale
-            if not moved.any():
-                break
-            slopes = slopes + np.outer(following - value - slopes @ moved, moved) / (moved @ moved)
-            if np.linalg.norm(following) >= norm:
-                break
-            x, value = trial, following
+        x = solve(
+            lambda x: self.left(self.fly(self.schedule(x))),
+            np.column_stack([self.start, self.scale, self.lower, self.upper]),
+            lambda: False,
+            lambda _x, _value: self.slopes(self.flight),
+        )
         tick = self.windows.limits.tick
         return self.schedule(x) if tick is None else self._on_ticks(x, tick)
 

@@ -4,7 +4,6 @@ of the thrust.
 
 import math
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +13,7 @@ from support import reference
 from support.builders import aimed, channel, codes, cross, documented, one_of, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import refused
+from support.spinners import swells, through
 
 from nutdamp.common.results import Value
 from nutdamp.errors import Infeasible
@@ -42,15 +42,6 @@ MEASURED = Measured(
 VALVES = {"late": LATE, "slow": SLOW, "effective": EFFECTIVE, "measured": MEASURED}
 
 
-def through(valve: Valve | None, body: Spacecraft) -> Spacecraft:
-    """The body with this valve on all its thrusters."""
-    return (
-        body
-        if valve is None
-        else replace(body, channels=tuple(one.of(valve=valve) for one in body.channels))
-    )
-
-
 def short_pulses(degrees: float = 0.4, *, axial: float = 0.0) -> Spacecraft:
     """Pulses of about 50 ms across a body at 30 rpm."""
     torques = ((8.0, 0.0), (-8.0, 0.0), (0.0, 8.0), (0.0, -8.0))
@@ -77,27 +68,12 @@ CASES = {
 """The scheme up to the comma, and a body in which it leaves no nutation."""
 
 
-def levels(made: Schedule, body: Spacecraft) -> Iterable[reference.Swell]:
-    """The thrust of commands through the valves of `Trapezoid`, from start and on-time as loaded
-    alone.
-    """
-    valves = {one.name: one.valve for one in body.channels}
-    for pulse in made:
-        valve = valves[pulse.channel]
-        assert isinstance(valve, Trapezoid)
-        times: dict[str, Any] = {"opening": valve.open_delay, "closing": valve.close_delay}
-        ramps: dict[str, Any] = {"rise": valve.rise_time, "fall": valve.fall_time}
-        yield from reference.through_valve(
-            pulse.loaded[0], pulse.loaded[1], present(pulse.torque), **times, **ramps
-        )
-
-
 def left(made: Schedule, body: Spacecraft) -> float:
     """What commands leave, rad, by the reference: nutation, or with a target the way to it,
     whichever is more.
     """
     moments = body.inertia.moments
-    motion = reference.fly(moments, body.omega0, levels(made, body), made.end + 0.01)
+    motion = reference.fly(moments, body.omega0, swells(body, made), made.end + 0.01)
     nutation = reference.nutation(moments, motion.rates, 1.0)
     to_go = body.goal.axis is not None and reference.angle(
         reference.momentum(moments, motion), body.target_axis

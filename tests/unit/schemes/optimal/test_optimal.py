@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 from support import reference
-from support.builders import Outcome, channel, cross, noted, present, spinner
+from support.builders import Outcome, channel, codes, cross, noted, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
@@ -141,6 +141,16 @@ def test_few_pulses_come_before_a_last_tenth_of_a_percent_and_the_plan_carries_i
     made = flies(spinner(channels=REAL))
     assert len(made.pulses) <= 12
     check_text("plan.proof", noted(plan_notes(made)))
+    bounds = present(made.pulses.bounds)
+    pulses = replace(made, options=OptimalOptions(free_axis=False, least="pulses"))
+    for told, share, code in (
+        (made, 1.004, "small-angle-bound"),
+        (made, 1.006, "above-bound"),
+        (pulses, 1.006, "small-angle-bound"),
+    ):
+        first = made.pulses.cost_in(bounds.unit) / share
+        above = replace(made.pulses, bounds=bounds._replace(first_order=first))
+        assert code in codes(plan_notes(replace(told, schedule=above)))
 
 
 @pytest.mark.deep
