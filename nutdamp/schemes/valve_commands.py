@@ -10,6 +10,7 @@ shape of the thrust are corrected on the flown motion.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -35,7 +36,13 @@ from nutdamp.spacecraft.constraints import (
 from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Attitude, Inertia, Limits, Spacecraft, disturbing_after
 from nutdamp.spacecraft.roles import with_limits
-from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.spacecraft.schedule import (
+    STEERABLE,
+    Pulse,
+    Schedule,
+    channel_pulse,
+    steerable_pulse,
+)
 
 ROUNDING = 1e-12  # share by which an on-time may pass its bounds
 # share of the longest pulse that the next plan leaves at either end of all, where there was too
@@ -431,8 +438,19 @@ class FlownBuilder:
         )
 
     def schedule(self, *notes: Note) -> Schedule:
-        """Chosen pulses."""
-        return Schedule(tuple(self.pulses), notes)
+        """Chosen pulses; ideal ones of a steerable torquer at one moment as their sum."""
+        pulses = list[Pulse]()
+        torquer = self.at_leg.torquer
+        for pulse in self.pulses:
+            ideal = pulse.channel == STEERABLE and pulse.on_time == 0.0
+            if torquer is not None and ideal and pulses and pulses[-1].t == pulse.t:
+                first, second, _ = (pulses.pop().impulse + pulse.impulse).tolist()
+                angle = math.atan2(second, first)
+                size = math.hypot(first, second)
+                pulses.append(steerable_pulse(torquer, pulse.t, angle, impulse=size))
+            else:
+                pulses.append(pulse)
+        return Schedule(tuple(pulses), notes)
 
 
 class Legs:
