@@ -383,7 +383,8 @@ def test_two_blocks_a_turn_are_written_as_they_are_fired(run: Run, tmp_path: Pat
         flown = run("simulate", source, *options, *output, status=0)
         again = json.loads(flown.stdout)
         assert [pulse["start_s"] for pulse in again["pulses"]] == pytest.approx(starts, abs=1e-6)
-        assert flown.stderr == ""
+        codes = re.findall(r"warning\[(.*?)\]", flown.stderr)
+        assert set(codes) <= {"models-differ"}  # the schedule is read as it was written
 
 
 def test_a_single_flight_has_no_jitter_of_the_sun_pulses(run: Run, blocks: ReadBlocks) -> None:

@@ -229,16 +229,13 @@ def test_a_case_that_coasts_while_others_fire_takes_no_steps(
     model = DispersedModel(body, Schedule(tuple(pulses)))
     spans = list[float]()
     draws = dispersed.first_cases(Study(model), CASES)
-    for integrated in ("polynomials", "_advance_symmetric"):
-        integrate = getattr(motion, integrated)
+    integrate = motion.polynomials
 
-        def watched(
-            here: motion.MotionStretch, duration: Any, *limit: int, integrate: Any = integrate
-        ) -> Any:
-            spans.append(float(np.max(np.linalg.norm(here.rates, axis=0) * duration)))
-            return integrate(here, duration, *limit)
+    def watched(here: motion.MotionStretch, duration: Any, *limit: int) -> Any:
+        spans.append(float(np.max(np.linalg.norm(here.rates, axis=0) * duration)))
+        return integrate(here, duration, *limit)
 
-        monkeypatch.setattr(motion, integrated, watched)
+    monkeypatch.setattr(motion, "polynomials", watched)
     flown = outputs(model, draws)
     assert max(spans) < 5.0
     for case in range(0, CASES, 6):
