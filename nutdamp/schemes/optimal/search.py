@@ -279,13 +279,14 @@ def by_program(search: Search, _: Schedule | None) -> Schedule | None:
 def by_shorter_programs(search: Search, best: Schedule | None) -> Schedule | None:
     """From the program of half the horizon, of a quarter, and so on, down to a nutation period.
 
-    Where none of these gives a schedule, from three quarters and from five eighths likewise: which
-    program leads to one is chance, and one that does not takes 30 ms (three moments within 120 s).
+    With three moments, where none of these gives a schedule, from three quarters and from five
+    eighths likewise: which program leads to one is chance, and one that does not takes 30 ms.
     """
     spacecraft = search.spacecraft
     shortest = max(shortest_on_time(spacecraft, channel) for channel in search.channels)
     least = spacecraft.limits.earliest + max(spacecraft.inertial_period, shortest)
-    for attempt, share in enumerate((0.5, 0.75, 0.625)):
+    shares = (0.5,) if spacecraft.inertia.symmetric else (0.5, 0.75, 0.625)
+    for attempt, share in enumerate(shares):
         horizon = share * spacecraft.horizon
         halvings = 1
         while horizon > least and search.dear(best, DEARER) and not work.exhausted():
