@@ -55,7 +55,8 @@ def free_rates(moments: ArrayLike, rates0: ArrayLike, times: ArrayLike) -> Array
     the spacecraft itself.
     """
     polhodes = _polhodes(_column(moments), _column(rates0))
-    return polhodes.body_rates(np.asarray(times, dtype=float)).T
+    scaled = _rates(polhodes, polhodes.rate_unit * np.asarray(times, dtype=float))
+    return (polhodes.rate_unit * polhodes.in_body(scaled)).T
 
 
 def free_attitude(
@@ -95,7 +96,8 @@ def coasts(moments: Array, rates0: Array, quaternion0: Array, times: Array) -> t
     # the nutation.
     swing = np.copysign(polhodes.about_c / size, polhodes.moments[0] - polhodes.moments[2])
     chi = twice_energy / size * scaled + swing * _swing(polhodes, size, scaled)
-    end = polhodes.moments * _rates(polhodes, scaled)
+    rates = _rates(polhodes, scaled)
+    end = polhodes.moments * rates
     toward = polhodes.in_body(e)
     cosine, sine = np.cos(0.5 * chi), np.sin(0.5 * chi)
     w, x, y, z = _shortest(polhodes.in_body(start), toward)
@@ -108,7 +110,8 @@ def coasts(moments: Array, rates0: Array, quaternion0: Array, times: Array) -> t
         constant = np.array([np.cos(half), *(np.sin(half) / speed * rates0)])
         turns = np.where(still, constant, turns)
     result: Array = np.array(attitude.product(quaternion0, turns))
-    return polhodes.body_rates(times), result / np.sqrt(np.sum(result * result, axis=0))
+    later = polhodes.rate_unit * polhodes.in_body(rates)
+    return later, result / np.sqrt(np.sum(result * result, axis=0))
 
 
 def body_nutation_rate(moments: ArrayLike, spin: float, wheel: float = 0.0) -> float:
@@ -209,10 +212,6 @@ class _ScaledPolhodes(NamedTuple):
     def in_body(self, vectors: Array) -> Array:
         """Vectors (3, n) with their components in the order of the body's axes 1, 2, 3."""
         return np.take_along_axis(vectors, np.argsort(self.axes, axis=0), axis=0)
-
-    def body_rates(self, times: Array) -> Array:
-        """Rates (3, n) in rad/s after ``times`` (n,) s."""
-        return self.rate_unit * self.in_body(_rates(self, self.rate_unit * times))
 
 
 def _polhodes(moments: Array, rates0: Array) -> _ScaledPolhodes:
