@@ -206,9 +206,9 @@ def advance(here: MotionStretch, duration: Any) -> None:
 
 def _left_alone(here: MotionStretch) -> bool:
     """True for bodies without wheel, torque or dissipation."""
-    (turning, growth, wheel, _, timed), constant = here.bodies.forcing, here.bodies.constant
-    driven = turning or timed or growth != 0.0 or np.any(wheel) or constant.any()
-    return not driven and here.torque is None and here.falling is None
+    forcing = here.bodies.forcing
+    pure = forcing.growth == 0.0 and not np.any(forcing.wheel) and not here.bodies.driven
+    return pure and here.torque is None and here.falling is None
 
 
 def polynomials(here: MotionStretch, duration: Any, most: int = MOST_STEPS) -> Iterator[Polynomial]:

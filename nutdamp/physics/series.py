@@ -103,10 +103,14 @@ class Bodies:
         return bool(np.array_equal(self.moments[0], self.moments[1]))
 
     @property
+    def driven(self) -> bool:
+        """True if external torques act on them."""
+        return bool(self.constant.any() or self.forcing.turning or self.forcing.timed)
+
+    @property
     def free(self) -> bool:
         """True if every coast is an arc of a symmetric body without external torque."""
-        driven = self.constant.any() or self.forcing.turning or self.forcing.timed
-        return not driven and self.symmetric
+        return not self.driven and self.symmetric
 
     def between(self, first: float, last: float) -> Bodies:
         """Bodies as they are driven from ``first`` to ``last`` s, between two edges of their
