@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -194,7 +194,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
     from nutdamp.files.tabular import STDOUT, check_place, write_whole
 
     if listed:
-        from nutdamp.views.explain import examples_screen
+        from nutdamp.views.guide import examples_screen
 
         show(examples_screen(tuple((name, example_subject(name)) for name in example_names())))
         return
@@ -222,7 +222,7 @@ def schema_command(output: str) -> None:
 
 
 def _topics(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[str]:
-    from nutdamp.views.explain import completed
+    from nutdamp.views.guide import completed
 
     return completed(begun)
 
@@ -239,16 +239,16 @@ def explain_command(topic: tuple[str, ...]) -> None:
     SPACECRAFT, else of spacecraft.yaml here or the built-in example; any other word of
     a screen. Without it the pages are listed. On a terminal long pages go through a pager.
     """
-    from nutdamp.views import explain
+    from nutdamp.views import guide
 
     *words, last = topic or ("",)
     file = last if words and Path(last).is_file() else None
     requested = " ".join(words if file else topic).strip()
     shown = console()
     screen = (
-        explain.topic_screen(explain.explained(requested, partial(_channels, file)))
+        guide.topic_screen(guide.explained(requested, partial(_channel, file)))
         if requested
-        else explain.topics_screen()
+        else guide.topics_screen()
     )
     if shown.is_terminal and on_keyboard():
         with shown.capture() as captured:
@@ -259,12 +259,14 @@ def explain_command(topic: tuple[str, ...]) -> None:
     show(screen)
 
 
-def _channels(file: str | None, name: str) -> Iterator[Topic]:
-    """Channels of that ``name`` of a file, else of the default file, or of the built-in example
+def _channel(file: str | None, name: str) -> Topic | None:
+    """The channel of that ``name`` of a file, else of the default file, or of the built-in example
     where there is none without fault.
     """
     from nutdamp.api import example
-    from nutdamp.views.check import channel_topics
+    from nutdamp.views.check import channel_facts
+    from nutdamp.views.guide import Topic, listed
+    from nutdamp.views.parts import named
 
     try:
         spacecraft = FileInput(file).source(lambda _: None, lambda _: None).read()
@@ -272,7 +274,9 @@ def _channels(file: str | None, name: str) -> Iterator[Topic]:
         if file is not None:
             raise
         spacecraft = example()
-    return channel_topics(spacecraft, name)
+    rows = channel_facts(spacecraft, name)
+    about = f"a channel of {named(spacecraft).plain}"
+    return Topic(name, about, listed(rows)) if rows else None
 
 
 def on_keyboard() -> bool:

@@ -127,7 +127,7 @@ def _settings(
 
 
 def _keys(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[str]:
-    from nutdamp.views.explain import completed_keys
+    from nutdamp.views.guide import completed_keys
 
     return completed_keys(begun)
 
@@ -441,7 +441,19 @@ def deliver(
     """
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.
-    contents = [(path, _file_of(make(), path)) for path, make in outputs if path is not None]
+    contents: list[tuple[str, Any]] = []
+    for path, make in outputs:
+        if path is not None:
+            content: Any = make()
+            if isinstance(content, dict):
+                from nutdamp.files.tabular import json_text
+
+                content = json_text(content)
+            elif not (isinstance(content, str | bytes) or callable(content)):
+                from nutdamp.figures.image import rendered
+
+                content = rendered(content, path)
+            contents.append((path, content))
     with look_of_screen():
         shown = [make() for make in screens]
     if contents:
@@ -460,18 +472,6 @@ def deliver(
         say(f"nutdamp: {failure}")
     if failures:
         raise failures[-1]
-
-
-def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]], object]:
-    if isinstance(content, dict):
-        from nutdamp.files.tabular import json_text
-
-        return json_text(content)
-    if isinstance(content, str | bytes) or callable(content):
-        return content
-    from nutdamp.figures.image import rendered
-
-    return rendered(content, path)
 
 
 OPTIONS, WRITTEN, SCREEN = "Options", "Files to write", "Screen"  # headings of a help page
@@ -515,15 +515,6 @@ help_all = click.Option(
 )
 
 
-def _heading(option: click.Option) -> str:
-    """Heading of an option on the help page."""
-    if option.is_eager or option.name in ("units", "verbose", "quiet"):
-        return SCREEN
-    if isinstance(option.type, OutputName) or option.name == "figure":
-        return WRITTEN
-    return str(getattr(option, "group", OPTIONS))
-
-
 class SessionCommand(click.Command):
     """A command whose help page has headings; shared parameters are gathered into ``job``."""
 
@@ -557,12 +548,16 @@ class SessionCommand(click.Command):
         """The options under their headings, rare ones only with ``--help-all``."""
         groups: dict[str, list[tuple[str, str]]] = {OPTIONS: [], GOAL: [], WRITTEN: [], SCREEN: []}
         hidden = set() if ctx.meta.get(HELP_ALL) else self.rare()
-        for parameter in self.get_params(ctx):
-            record = parameter.get_help_record(ctx)
-            if parameter.name in hidden:
+        for option in self.get_params(ctx):
+            record = option.get_help_record(ctx)
+            if option.name in hidden or record is None or not isinstance(option, click.Option):
                 continue
-            if record is not None and isinstance(parameter, click.Option):
-                groups.setdefault(_heading(parameter), []).append(record)
+            heading = str(getattr(option, "group", OPTIONS))
+            if option.is_eager or option.name in ("units", "verbose", "quiet"):
+                heading = SCREEN
+            elif isinstance(option.type, OutputName) or option.name == "figure":
+                heading = WRITTEN
+            groups.setdefault(heading, []).append(record)
         for heading, records in groups.items():
             if records:
                 with formatter.section(heading):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -126,7 +126,7 @@ def plan_command(
     from nutdamp.planning.decision import usual
     from nutdamp.planning.notes import comparison_warnings
     from nutdamp.spacecraft.tolerances import expect_dispersions
-    from nutdamp.views.glance import scheme_table
+    from nutdamp.views.glance import glance, scheme_table
     from nutdamp.views.parts import pulse_table
 
     if robust:
@@ -157,7 +157,15 @@ def plan_command(
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
         job.note(comparison_warnings(compared))
-    screen = partial(_screen, compared, dispersed, verbose)
+    screen: Callable[[], RenderableType]
+    if verbose or dispersed is not None:
+        from nutdamp.views.robust import comparison_screen, robust_screen  # not for a glance
+
+        screen = partial(comparison_screen, compared)
+        if dispersed is not None:
+            screen = partial(robust_screen, dispersed, verbose=verbose)
+    else:
+        screen = partial(glance, compared)
     job.deliver(None, screen, more=more, unsaved=unproved)
     leave(judged.status, failed=show_failures(compared))
 
@@ -200,17 +208,3 @@ def _certified(
             "which is not the recommended plan"
         )
     return {"certificate": partial(certificate_json, proof)}, []
-
-
-def _screen(
-    compared: Comparison, dispersed: RobustComparison | None, verbose: bool
-) -> RenderableType:
-    from nutdamp.views.glance import glance
-
-    if dispersed is None and not verbose:
-        return glance(compared)
-    from nutdamp.views.robust import comparison_screen, robust_screen  # fewer modules for a glance
-
-    if dispersed is None:
-        return comparison_screen(compared)
-    return robust_screen(dispersed, verbose=verbose)

@@ -1,17 +1,17 @@
 """Propellant and pulses a year that hold the nutation against energy dissipation, and how long the
 tank lasts.
 
-They are those of the limit cycle of the loop from event to event: between two, z grows as e^{(κ -
-iω)t}, so that the time from one size to another is ln(s1/s0)/κ; noise decides in which sample a
-threshold is first reached, and only the few samples in which a channel may come to fire are worked
-out one by one. Many cycles are followed side by side.
+They are those of the limit cycle of the loop. Of each cycle only the firings are flown, from where
+the loop sees its start threshold to where it falls quiet, many loops side by side. Between, z grows
+as e^{(κ - iω)t}, so that the wait is ln(s1/s0)/κ; s1, at which noise first shows the threshold, is
+drawn.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import results, work
-from nutdamp.control_loop.controller import SAMPLED, Watch
-from nutdamp.control_loop.law import Actuator, ComplexArray, Law
-from nutdamp.control_loop.simulation import fly
+from nutdamp.control_loop.controller import MOST, Case, Pilot
+from nutdamp.control_loop.law import Array, ComplexArray, Law
+from nutdamp.control_loop.simulation import Fleet
 from nutdamp.control_loop.stability import (
     FARTHEST,
     Band,
@@ -32,18 +32,12 @@ from nutdamp.control_loop.stability import (
     transfer,
 )
 from nutdamp.errors import Infeasible
-from nutdamp.flight.dynamics import Supply
-from nutdamp.physics.thruster import Ramp, shape_factor
 from nutdamp.planning.verdict import Status, status_of
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.equipment import Loop
-from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.model import Inertia, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.roles import with_limits
-from nutdamp.spacecraft.schedule import Pulse, channel_pulse
-
-Rows = NDArray[np.int64]
 
 
 class Cycle(NamedTuple):
@@ -60,525 +54,231 @@ class Cycle(NamedTuple):
     largest: float
 
 
-class Sums(NamedTuple):
-    """Sums of a chain up to the last pulse: its time (s), and its largest and last |z|, rad/s."""
-
-    time: float = 0.0
-    pulses: float = 0.0
-    impulse: float = 0.0
-    propellant: float = 0.0
-    spin: float = 0.0
-    cycles: float = 0.0
-    largest: float = 0.0
-    last: float = 0.0
-
-
-ADDED = 6  # columns of `Sums` of which differences count
-
-
-@dataclass(eq=False)
-class Chains:
-    """State of each chain: z at the sample ``number``; ``fresh``: at the first estimate after a
-    firing.
-    """
-
-    z: ComplexArray
-    number: Rows
-    active: NDArray[np.bool_]
-    fresh: NDArray[np.bool_]
-    ready: Vector  # s from which on it may fire again
-    carried: Vector  # previous waits of its channels
-    white: ComplexArray  # noise of its samples
-    sums: list[Sums]
-
-    def __post_init__(self) -> None:
-        self.firings: list[list[Sums]] = [[] for _ in self.sums]
-        self.cycles: list[list[Sums]] = [[] for _ in self.sums]
-
-
-class Entry(NamedTuple):
-    """State in which a chain begins: z rad/s at ``time`` s; ``active`` after a firing; ``ready`` s
-    to fire again.
-    """
-
-    z: complex
-    time: float
-    active: bool
-    ready: float
-
-
-CHAINS, CYCLES, SETTLING = (
-    64,
-    16,
-    2,
-)  # cycles followed side by side, counted cycles of each, and cycles before those
-FIRINGS = 200  # firings of each, at most, and as many more as bring the nutation down from start
-MOST_FOLLOWED = 2000  # firings of each, at most, whatever start
-ALONE = 8  # factor on cycles and firings of chains that have no noise
-ENTRIES, LOOKED = (
-    16,
-    1_000_000,
-)  # flights, at most, from the state of the file down to start, and samples of them all
-FEW = 4  # cycles per so many firings below which firings are counted instead
-STEP = 0.1  # units of work of a stretch of sixteen chains
-MOST_STEPS = 100_000  # stretches in all, at most
-ROWS = 128  # largest number of samples computed one by one at a time
-EARLY, LATE = (
-    0.003,
-    3.0,
-)  # probabilities of the start threshold between which samples are examined one by one
-LONGEST_LOOKED = 10_000  # largest number of samples examined one by one
-SIGMAS = 5.0  # reach of noise, sigmas, in which a channel may come to fire
-OUTGROWN = 4.0  # multiple of the expected dead band at which a loop does not hold the nutation
-# by which a random walk first passes a level, 0.58 steps, in sigmas of new noise: √2 times
-OVERSHOOT = 0.82
-# growth of the nutation from the first of many firings to the middle, and on, where it is not held
+LOOPS, CYCLES = 64, 5  # loops flown side by side, and cycles counted of each
+ALONE = 32  # factor on the cycles of a single loop without noise
+ENTRIES = 16  # loops flown down from a state, and of those that never fall quiet
+FIRINGS = 60  # firings of a flight, at most, and twice as many more as bring the nutation down
+MOST_DOWN = 2000  # of these, at most, whatever the nutation
+CONTINUOUS = 4096  # samples of a nutation period by which a continuous signal is flown
+EARLY, LATE = 0.003, 3.0
+"""Probabilities of the start threshold between which every sample is looked at where the chances of
+samples do not add up.
+"""
+LONGEST_LOOKED = 10_000  # largest number of samples looked at so
+# growth of the nutation from the first half of many firings to the second where it is not held
 RISING = 1.1
+OUTGROWN = 4.0  # multiple of the nutation that there may be at which a loop does not hold it
+FOLDS = 3.0  # e-folds in which what a firing leaves, if anything, grows to what one may lower
 SPENT = "the budget of work was used up before the limit cycle was reached"
 TOO_FAST = "the nutation grows faster than the firings damp it"
-REFINED = 4  # steps in which the moment of a firing is found on a continuous signal
 
 
-class Map:
-    """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of
-    propellant gone.
+class Cycles:
+    """Flights of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of propellant
+    gone.
 
     Raises Infeasible where no law can work. Blackout windows, and nozzles that are cold at first,
-    are left out.
+    are left out; a body of three moments is the symmetric one whose small nutation turns as fast.
     """
 
     def __init__(
         self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1
     ) -> None:
-        limits = replace(spacecraft.limits, blackout=(), earliest=0.0)
-        tank = spacecraft.tank and spacecraft.tank.doubled  # so that none runs empty amid a cycle
-        self.truth = replace(spacecraft, cold=None, tank=tank, limits=limits)
-        self.used = used
-        self.law = Law(self.truth, loop)
-        self.spin = spacecraft.spin
-        self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
+        # Doubled, so that none runs empty amid a cycle.
+        tank = spacecraft.tank and replace(spacecraft.tank.doubled, used=used)
+        plain = replace(spacecraft, cold=None, tank=tank, disturbances=())
+        truth = _symmetric(with_limits(plain, blackout=(), earliest=0.0), loop)
+        if loop.sensor.rate is None:
+            rate = CONTINUOUS / truth.body_period
+            loop = replace(
+                loop, sensor=replace(loop.sensor, rate=rate, noise=0.0, quantisation=0.0)
+            )
+        self.truth, self.loop, self.spin = replace(truth, loop=loop), loop, truth.spin
+        self.law = Law(truth, loop)
         self.seen = transfer(self.law, self.spin)
-        self.ahead = self.watch.ahead = (
-            self.seen.step if loop.predict or loop.sensor.rate is None else 0.0
-        )
+        self.start = self.law.size(loop.start, self.spin)
         self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
-        self.slower = requirements.slower(spacecraft, loop.start)
-        self.start, self.stop = (
-            self.law.size(angle, self.spin) for angle in (loop.start, loop.stop)
-        )
-        self.channels = {channel.name: channel for channel in spacecraft.channels}
-        self.up = Odds(self.seen, self.start, self.law.growth, below=False)
-        self.down = (
-            Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
-        )
+        self.up = Odds(self.seen, self.start, self.law.growth)
         self.near = self._near()
-        reach = SIGMAS * self.seen.sigma + abs(self.seen.offset)
-        half = abs(0.5 * self.turn.imag)
-        acts = [
-            abs(actuator.kick) * abs(math.sin(half * actuator.shortest)) / half
-            for actuator in self.law.actuators
-        ]
-        longest = min(
-            abs(each.kick) * abs(math.sin(half * each.longest)) / half
-            for each in self.law.actuators
-        )
-        self.firings = FIRINGS + min(math.ceil(2.0 * self.start / longest), MOST_FOLLOWED)
-        self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
-        self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
-        self.memory = len(self.seen.weights) if len(self.seen.weights) > 1 else 0
-        self.shapes: dict[tuple[str, float], complex] = {}
+        self.slower = requirements.slower(truth, loop.start)
+        # Larger than what any firing takes off: firings are as long as can be.
+        far = complex(1e6 * self.start)
+        acts = (self.law.firing(actuator, far, self.spin) for actuator in self.law.actuators)
+        self.takes = min(abs(firing.acts) for firing in acts if firing is not None)
+        self.rng, self.seed, self.numbers = np.random.default_rng(seed), seed, itertools.count(1)
 
-    def entries(self, spacecraft: Spacecraft, seed: int = 1) -> list[Entry]:
-        """States in which flights of the loop from that of the file come down to start, by the
-        noise of each.
-        """
-        z = complex(self.law.seen(spacecraft.initial.omega))
-        if abs(z) <= FARTHEST * self.start:
-            return []
-        now = Entry(z, 0.0, active=False, ready=spacecraft.limits.earliest)
-        if abs(z) < self.start:
-            return [now]
-        loop = self.law.loop
-        entries = list[Entry]()
-        looked = 0
-        limited = with_limits(spacecraft, max_pulses=None)
-        each = 3.0 * (self.law.period + self.seen.first + loop.min_interval) + loop.sensor.delay
-        until = spacecraft.limits.earliest + each * self.firings * abs(z) / self.start
-        for number in range(ENTRIES):
-            run = fly(limited, loop, until, seed=seed + number, down_to=self.start)
-            if not run.fired:
-                return [now]
-            z = complex(self.law.seen(run.flight.settled.omega))
-            if run.stop.fault or not abs(z) < self.start:
-                why = run.stop.value if run.stop.fault else TOO_FAST
-                raise Infeasible(f"the loop does not come down to start: {why}")
-            entries.append(
-                Entry(z, run.fired[-1].pulse.thrust[1], active=True, ready=run.pilot.ready)
-            )
-            looked += run.looked_at
-            if loop.sensor.noise == 0.0 or looked * (number + 2) > LOOKED * (number + 1):
-                break
-        return entries
-
-    def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
-        """Limit cycle of chains in random phases; raises Infeasible where the loop does not hold
-        the nutation.
-        """
-        at = self._begin(chains)
-        self._follow(at, SETTLING + cycles, self.firings)
-        return self._summed(at.firings, at.cycles)
-
-    def attractors(
-        self, entries: Sequence[Entry] = (), chains: int = CHAINS
-    ) -> tuple[tuple[Cycle, float], ...]:
-        """Limit cycles in which chains end, most first, with the share of each; raises as `cycle`.
-
-        They begin in the ``entries``, by turns, or in random phases at half the start threshold.
-        """
-        alike = bool(entries) and not (any(self.seen.scatter) or any(self.seen.grain))
-        chains, longer = (len(entries), ALONE) if alike else (chains, 1)
-        at = self._begin(chains)
-        for row, entry in zip(
-            range(chains if entries else 0), itertools.cycle(entries), strict=False
-        ):
-            self._enter(at, row, entry)
-        self._follow(at, 0, self.firings)  # until each has paused, or fires on at the same size
-        at = replace(at, sums=[total._replace(pulses=0.0, cycles=0.0) for total in at.sums])
-        self._follow(at, SETTLING + longer * CYCLES, longer * self.firings)
-        ends: list[list[tuple[list[Sums], list[Sums]]]] = [[], []]
-        for firings, cycles in zip(at.firings, at.cycles, strict=True):
-            paused = cycles[-1].pulses if cycles else 0.0
-            later = [total for total in firings if total.pulses > paused]
-            never = 2 * len(later) >= self.firings  # it does not pause any more
-            ends[never].append((later, []) if never else (firings, cycles))
-        parts = sorted(filter(None, ends), key=len, reverse=True)
-        return tuple((self._summed(*zip(*part, strict=True)), len(part) / chains) for part in parts)
-
-    def _enter(self, at: Chains, row: int, entry: Entry) -> None:
-        """Put a chain where ``entry`` is, at its first estimate."""
-        number = math.ceil((entry.time + self.seen.first) / self.seen.step - SAMPLED)
-        at.z[row] = entry.z * np.exp(self.turn * (number * self.seen.step - entry.time))
-        at.number[row], at.active[row], at.fresh[row], at.ready[row] = (
-            number,
-            entry.active,
-            True,
-            entry.ready,
-        )
-
-    def _follow(self, at: Chains, cycles: int, firings: int) -> None:
-        """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings``
-        times.
-        """
-        going = np.ones(len(at.z), dtype=bool)
-        for _ in range(MOST_STEPS):
-            work.spend(STEP * (1.0 + len(going) / 16.0))
-            if work.exhausted():
-                break
-            self._wake(at, np.flatnonzero(going & ~at.active))
-            self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
-            self._look(at, np.flatnonzero(going))
-            going = np.array(
-                [total.cycles <= cycles and total.pulses < firings for total in at.sums]
-            )
-            if not going.any():
-                return
-        raise Infeasible(SPENT)
+    @property
+    def of_file(self) -> complex:
+        """z as the file has it, rad/s."""
+        return complex(self.law.seen(self.truth.initial.omega))
 
     def _near(self) -> float | None:
-        """Size of z from which on every sample is examined; None where the chances of the samples
-        add up.
+        """Size of z from which on every sample is looked at; None where the chances of the samples
+        add up: where the noise of each is new, or z grows little while it lasts.
         """
-        seen = (
-            self.seen
-        )  # chances add up where the noise of each sample is new, or z grows little while it lasts
+        seen = self.seen
         if not any(seen.grain) and (seen.fresh > 0.5 or seen.sigma == 0.0):
             return None
         # No more likely than if each sample had a chance of its own.
-        bound = Odds(seen._replace(fresh=1.0), self.start, self.law.growth, below=False)
-        first, last = (
-            float(odds.size(1e-3 * self.start, chance))
-            for odds, chance in ((bound, EARLY), (self.up, LATE))
-        )
-        return (
-            first
-            if math.log(last / first) / (self.turn.real * seen.step) < LONGEST_LOOKED
-            else None
-        )
+        bound = Odds(seen._replace(fresh=1.0), self.start, self.law.growth)
+        first = float(bound.size(1e-3 * self.start, EARLY))
+        last = float(self.up.size(1e-3 * self.start, LATE))
+        looked = math.log(last / first) / (self.law.growth * seen.step)
+        return first if looked < LONGEST_LOOKED else None
 
-    def _begin(self, count: int) -> Chains:
-        """Coasts at half the start threshold, in random phases."""
-        z = (
-            0.5
-            * self.start
-            / abs(self.seen.direct)
-            * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
-        )
-        number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
-        quiet = np.zeros(count, dtype=bool)
-        waits = np.full((len(self.law.actuators), count), math.nan)
-        white = self._drawn(count)
-        sums = [Sums()] * count
-        return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums)
+    def attractors(
+        self, first: complex = 0j, loops: int = LOOPS, cycles: int = CYCLES
+    ) -> tuple[tuple[Cycle, float], ...]:
+        """Limit cycles in which loops end that begin with z ``first`` rad/s, most first, with the
+        share of each; raises Infeasible where they do not hold the nutation.
 
-    def _drawn(self, rows: int) -> ComplexArray:
-        return self.seen.drawn(self.rng, rows, len(self.seen.weights))
-
-    def _waits(self, seen: ComplexArray) -> Vector:
-        return self.watch.waits(seen, np.full(seen.shape, self.spin))
-
-    def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
-        """Advance coasts by some samples, and forget the noise of those before."""
-        at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
-        at.number[rows] += samples
-        at.white[rows] = self._drawn(len(rows))
-        at.carried[:, rows] = self._waits(
-            self.seen.mean(at.z[rows] * np.exp(-self.turn * self.seen.step))
-        )
-
-    def _until(self, size: Vector | float, now: Vector) -> Rows:
-        """Samples until |z| has grown from ``now`` to ``size``."""
-        samples = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
-        return np.asarray(np.ceil(samples - SAMPLED), dtype=np.int64)
-
-    def _wake(self, at: Chains, rows: Rows) -> None:
-        """From pauses to the sample that first shows the start threshold, or to where each is
-        looked at.
+        Without any, and below the start threshold, they begin there in random phases.
         """
-        now = np.abs(at.z[rows])
-        if (now <= FARTHEST * self.start).any():
-            raise Infeasible(
-                "a firing leaves no nutation that could grow: sensor and valves have no errors"
-            )
-        if self.near is not None:
-            far = now < self.near
-            self._goes(at, rows[far], self._until(self.near, now[far]))
-            return
-        self._goes(
-            at, rows, self._until(self.up.size(now, self.rng.exponential(size=len(rows))), now)
-        )
-        at.active[rows] = True
-        if not any(self.seen.scatter):
-            return
-        for row in rows.tolist():
-            mean = complex(self.seen.mean(at.z[row]))
-            short = (self.start - abs(mean)) / self.seen.sigma
-            if short > 0.0:  # the noise of this sample is what was missing, and a little more
-                more = short + self.rng.exponential() * min(
-                    1.0 / max(short, 1.0), OVERSHOOT * math.sqrt(self.seen.fresh)
-                )
-                at.white[row] += self.seen.change(
-                    at.white[row], mean / abs(mean), more * self.seen.sigma
-                )
+        none = abs(first) <= FARTHEST * self.start
+        z = np.full(ENTRIES, 0.5 * self.start if none else first, dtype=complex)
+        if none:
+            z *= np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, len(z)))
+        elif not any(self.seen.scatter) and not any(self.seen.grain):  # all would be alike
+            z, loops, cycles = z[:1], 1, ALONE * cycles
+        z, quiet, _ = self._flown(z, pausing=abs(z[0]) < self.start)
+        share = float(quiet.mean())
+        never, rounds = [z[~quiet]], list[Array]()
+        z = np.resize(z[quiet], loops if share > 0.0 else 0)
+        while len(z) and len(rounds) <= cycles:
+            z, quiet, sums = self._flown(z, pausing=True)
+            never.append(z[~quiet])
+            z = z[quiet]
+            rounds = [each[:, quiet] for each in (*rounds, sums)]
+        share *= len(z) / loops
+        ends = []
+        if len(z):  # in the first round they part, by the noise of each
+            ends.append((self._summed(np.array(rounds[1:])), share))
+        if share < 1.0:
+            _, _, sums = self._flown(np.concatenate(never)[:ENTRIES], pausing=False)
+            ends.append((self._summed(sums[None]), 1.0 - share))
+        return tuple(sorted(ends, key=lambda end: -end[1]))
 
-    def _skip(self, at: Chains, rows: Rows) -> None:
-        """Over the samples in which no channel can come to fire: to the first that may, or to a
-        pause.
+    def _flown(
+        self, z: ComplexArray, *, pausing: bool
+    ) -> tuple[ComplexArray, NDArray[np.bool_], Array]:
+        """Flight of each loop to where it falls quiet, or has fired too often: z (n,) after its
+        last pulse, True where it is quiet, and sums (9, n) of it.
+
+        Where ``pausing`` it begins as the loop sees the start threshold, after a wait that counts.
         """
-        size = np.abs(at.z[rows])
-        mean = self.seen.mean(at.z[rows])
-        waits = self._waits(mean)
-        share = np.minimum(self.reach / np.maximum(np.abs(mean), self.reach + 1e-300), 1.0)
-        slack = 3.0 * self.seen.step + 0.25 * share * self.law.period
-        due = (
-            np.where(waits < self.ahead - slack, waits + self.law.period, waits)
-            - self.ahead
-            - slack
-        )
-        idle = np.isnan(due).all(axis=0)
-        soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
-        samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
-        samples[samples < self.memory] = 0
-        useless = idle & (
-            size < self.helps
-        )  # the smallest pulse would leave more than there is: no pause, it waits
-        samples[useless] = self._until(self.helps, size[useless])
-        if self.down is not None:
-            event = self.down.size(size, self.rng.exponential(size=len(rows)))
-            quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
-            samples[quiet] = self._until(event[quiet], size[quiet])
-            at.active[rows[quiet]] = False
-            self._rest(at, rows[quiet])
-        moved = samples > 0
-        self._goes(at, rows[moved], samples[moved])
-
-    def _look(self, at: Chains, rows: Rows) -> None:
-        """Examine the next samples one by one, up to the first event of each."""
-        step = self.seen.step
-        count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
-        white = np.concatenate(
-            [at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1
-        )
-        course = np.exp(self.turn * step * np.arange(count))
-        seen = self.seen.stepped(
-            self.seen.mean(at.z[rows][:, None] * course) + self.seen.noise(white)
-        )
-        awake = np.logical_or.accumulate(
-            (np.abs(seen) >= self.start) | at.active[rows, None], axis=1
-        )
-        waits = np.full((len(at.carried), *seen.shape), math.nan)
-        some = awake[:, -1]
-        waits[:, some] = self._waits(seen[some])
-        waits[:, ~some, -1] = self._waits(seen[~some, -1])
-        fires = self.watch.triggered(np.concatenate([at.carried[:, rows, None], waits], axis=2))
-        downs = awake & (np.abs(seen) <= self.stop)
-        firsts = np.where(downs.any(axis=1), downs.argmax(axis=1), count)
-        at.active[rows] = awake[:, -1]
-        fires &= awake & (np.arange(count) < firsts[:, None])
-        passes = np.ones(len(rows), dtype=bool)
-        for index in np.flatnonzero(fires.any(axis=(0, 2))).tolist():
-            passes[index] = not self._fires(at, int(rows[index]), seen[index], fires[:, index])
-        resting = rows[passes & (firsts < count)]
-        at.active[resting] = False
-        self._rest(at, resting)
-        places = np.flatnonzero(passes)
-        going = rows[passes]
-        passed = np.minimum(firsts[places] + 1, count)
-        at.z[going] *= np.exp(self.turn * step * passed)
-        at.number[going] += passed
-        at.white[going] = white[
-            places[:, None], passed[:, None] + np.arange(white.shape[1] - count)
-        ]
-        at.carried[:, going], at.fresh[going] = waits[:, places, passed - 1], False
-
-    def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
-        """First firing at one of the moments at which a channel triggers, if any."""
-        for moment in np.flatnonzero(fires.any(axis=0)).tolist():
-            time = (int(at.number[row]) + moment) * self.seen.step
-            actuators = (
-                self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist()
-            )
-            firings = [
-                firing
-                for each in actuators
-                if (firing := self._firing(each, complex(seen[moment]), time)) is not None
-            ]
-            if not firings:
-                continue
-            start, lasts, pulse, actuator = min(firings, key=lambda firing: firing[0])
-            if self.law.windows.allows(start, lasts, float(at.ready[row])):
-                self._fire(at, row, pulse, actuator)
-                return True
-        return False
-
-    def _firing(
-        self, actuator: Actuator, seen: complex, time: float
-    ) -> tuple[float, float, Pulse, Actuator] | None:
-        """Start, length and pulse of a firing decided on z ``seen`` at ``time`` s."""
-        now = time + self.law.loop.sensor.delay
-        law = self.law
-        more = (
-            REFINED if law.loop.sensor.rate is None else 0
-        )  # a continuous signal shows the moment itself
-        while (firing := law.firing(actuator, seen, self.spin)) is not None and more > 0:
-            now = now + firing.wait
-            seen = seen * complex(np.exp(self.turn * firing.wait))
-            more = more - 1
-        if firing is None:
-            return None
-        begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
-        start = law.windows.nearest_tick(begins)
-        start = law.windows.tick_after(begins) if start < now else start
-        pulse = channel_pulse(
-            self.channels[actuator.channel.name], start + firing.lead, firing.on_time
-        )
-        return (
-            start,
-            firing.lasts,
-            pulse if pulse.command is None else commandable(self.truth, pulse),
-            actuator,
-        )
-
-    def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
-        """Propagate through a pulse, and on to the first estimate after it."""
-        supplied = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
-        level = supplied.magnitude / pulse.magnitude
-        (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
-        before = complex(at.z[row])
-        sums = at.sums[row]
-        size = abs(before) * math.exp(self.turn.real * (begins - time))
-        if size > self.bound:
-            raise Infeasible(TOO_FAST)
-        acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
-        after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(
-            self.turn * (ends - pulse.t)
-        )
+        count = len(z)
+        before = size = np.abs(z)
+        if pausing:
+            if (before <= FARTHEST * self.start).any():
+                raise Infeasible(
+                    "a firing leaves no nutation that could grow: sensor and valves have no errors"
+                )
+            # The sample at which it shows: all are looked at from ``near`` on, where there is one.
+            size = np.maximum(before, self.near or 0.0)
+            if self.near is None:
+                size = self.up.size(before, self.rng.exponential(size=count))
+            samples = np.ceil(np.log(size / before) / (self.law.growth * self.seen.step))
+            size = before * np.exp(self.law.growth * (samples * self.seen.step - self.seen.first))
+            z = z * (size / before) ** (self.turn / self.law.growth)
+        first, second = self.law.gauge
+        rates = np.column_stack([z.real / first, z.imag / second, np.full(count, self.spin)])
+        down = math.ceil(2.0 * float(size.max()) / self.takes)
+        most = FIRINGS + min(down, MOST_DOWN)
+        truth = with_limits(self.truth, max_pulses=most)
+        cases = [Case(replace(truth, omega0=row), (self.seed, next(self.numbers))) for row in rates]
+        # What is not held ends at 90 deg, where nothing turns any more.
+        each = 3.0 * (self.law.period + self.seen.first + self.loop.min_interval)
+        until = most * (each + self.loop.sensor.delay) + FOLDS / self.law.growth
+        fleet = Fleet(self.law, cases, min(until, MOST * self.seen.step), once=True)
+        for pilot in fleet.pilots:
+            pilot.active = not pausing or self.near is None
+        fleet.fly()
+        if work.exhausted():
+            raise Infeasible(SPENT)
+        after = np.asarray(self.law.seen(fleet.rates[0] + 1j * fleet.rates[1]))
         # Dissipation takes spin as |z| grows at the same H: cos θ goes with ω3.
-        grown, settled = (
-            math.cos(float(self.law.nutation(angle, self.spin))) for angle in (size, sums.last)
-        )
-        slowed = float(self.law.inertia.equivalent(self.spin)) * (1.0 - grown / settled)
-        at.sums[row] = sums._replace(
-            time=pulse.t,
-            pulses=sums.pulses + 1.0,
-            impulse=sums.impulse + supplied.magnitude,
-            propellant=sums.propellant
-            + (math.nan if supplied.propellant is None else supplied.propellant),
-            spin=sums.spin + (actuator.spin_rate * level * pulse.on_time - slowed),
-            largest=max(sums.largest, size),
-            last=abs(after),
-        )
-        at.firings[row].append(at.sums[row]._replace(largest=size))
-        at.ready[row] = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
-        at.white[row], at.carried[:, row] = self._drawn(1)[0], math.nan
-        self._enter(at, row, Entry(after, ends, active=True, ready=at.ready[row]))
+        grown, rested = (np.cos(self.law.nutation(part, self.spin)) for part in (size, before))
+        slowed = float(self.law.inertia.equivalent(self.spin)) * (1.0 - grown / rested)
+        waited = np.log(size / before) / self.law.growth + (self.slower if pausing else 0.0)
+        sums = [
+            fleet.now + waited,
+            fleet.rates[2] - self.spin - slowed,
+            self.law.nutation(np.abs(after), self.spin),
+            *np.array([self._of_firings(pilot) for pilot in fleet.pilots]).T,
+        ]
+        return after, np.array([bool(pilot.quiet) for pilot in fleet.pilots]), np.array(sums)
 
-    def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
-        """Factor on the effect of a pulse on z by its width, with the growth in it."""
-        key = (pulse.channel, round(pulse.on_time, 9))
-        if key not in self.shapes:
-            ramps = (
-                (Ramp(pulse.start, pulse.end, 1.0, 1.0),)
-                if pulse.command is None
-                else pulse.command.ramps
-            )
-            moved = [
-                ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps
-            ]
-            rate = float(self.law.rate(self.spin))
-            slope = self.law.slope * actuator.spin_rate
-            self.shapes[key] = shape_factor(rate, slope, moved, 0.0, self.law.growth)
-        return self.shapes[key]
-
-    def _rest(self, at: Chains, rows: Rows) -> None:
-        """Record the sums of finished cycles, if anything was fired in them."""
-        for row in rows.tolist():
-            sums = at.sums[row]
-            if sums.largest > 0.0:
-                sums = sums._replace(cycles=sums.cycles + 1.0)
-                at.cycles[row].append(sums)
-                at.sums[row] = sums._replace(largest=0.0)
-
-    def _summed(self, firings: Iterable[list[Sums]], cycles: Sequence[list[Sums]]) -> Cycle:
-        """Mean of all chains, between the first and the last counted cycle, or firing."""
-        if all(len(cycle) >= SETTLING + FEW for cycle in cycles):
-            counted = [cycle[SETTLING:] for cycle in cycles]
-        else:
-            counted = [firing[len(firing) // 4 :] for firing in firings]
-            places = [
-                [part[place].largest for place in (0, len(part) // 2, -1)] for part in counted
-            ]
-            sizes = np.array(places).mean(axis=0)
-            if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
-                raise Infeasible(TOO_FAST)
-        spans = np.array([np.subtract(cycle[-1], cycle[0])[:ADDED] for cycle in counted])
-        spans[:, 0] += self.slower * spans[:, 5]
-        total = spans.sum(axis=0)
-        rates = (total / total[0]).tolist()
-        apart = spans[:, 1] - rates[1] * spans[:, 0]
-        angles = self.law.nutation(
-            np.concatenate([np.array(cycle[1:])[:, ADDED:] for cycle in counted]), self.spin
-        )
+    def _summed(self, rounds: Array) -> Cycle:
+        """Mean of the sums (rounds, 9, n) of some loops."""
+        time, spin, low, pulses, cycles, impulse, propellant, high, largest = rounds.swapaxes(0, 1)
+        total = float(time.sum())
+        rate = float(pulses.sum()) / total
+        used = float(propellant.sum()) / total
+        apart = (pulses - rate * time).sum(axis=0)
+        fired = pulses > 0.0
         return Cycle(
-            pulses=rates[1],
-            cycles=rates[5],
-            impulse=rates[2],
-            propellant=None if math.isnan(rates[3]) else rates[3],
-            spin_rate=rates[4],
-            doubt=math.sqrt(float((apart**2).sum())) / float(total[1]),
-            high=float(angles[:, 0].mean()),
-            low=float(np.exp(np.log(np.maximum(angles[:, 1], 1e-300)).mean())),
-            largest=float(angles[:, 0].max()),
+            pulses=rate,
+            cycles=float(cycles.sum()) / total,
+            impulse=float(impulse.sum()) / total,
+            propellant=None if math.isnan(used) else used,
+            spin_rate=float(spin.sum()) / total,
+            doubt=math.sqrt(float((apart**2).sum())) / float(pulses.sum()),
+            high=float(high[fired].mean()),
+            low=float(np.exp(np.log(np.maximum(low[fired], 1e-300)).mean())),
+            largest=float(largest.max()),
         )
+
+    def _of_firings(self, pilot: Pilot) -> tuple[float, ...]:
+        """Number of the firings of a flight, 1 if it ends in a pause, their impulse (N m s),
+        propellant (kg), nutation as they begin (rad), of a cycle that of the first, and the
+        largest; raises Infeasible where the nutation is not held.
+        """
+        sizes = np.array([each.true_nutation for each in pilot.fired] or [0.0])
+        half = len(sizes) // 2
+        step = float(self.law.nutation(self.takes, self.spin))
+        outgrown = sizes.max() > OUTGROWN * max(sizes[0], self.loop.start, step)
+        rises = not pilot.quiet and half and sizes[half:].mean() > RISING * sizes[:half].mean()
+        if pilot.ending[0].fault or outgrown or rises:
+            raise Infeasible(TOO_FAST)
+        pulses = [each.pulse for each in pilot.fired]
+        used = [math.nan if pulse.propellant is None else pulse.propellant for pulse in pulses]
+        return (
+            len(pulses),
+            bool(pilot.quiet),
+            math.fsum(pulse.magnitude for pulse in pulses),
+            math.fsum(used),
+            sizes.max() if pilot.quiet else sizes.mean(),
+            sizes.max(),
+        )
+
+
+def _symmetric(spacecraft: Spacecraft, loop: Loop) -> Spacecraft:
+    """Symmetric body that nutates as one of three moments does, by a small nutation: as fast, with
+    as much of a pulse, and with z as its ω.
+    """
+    inertia = spacecraft.inertia
+    if inertia.symmetric:
+        return spacecraft
+    law = Law(spacecraft, loop)
+    A = inertia.nutating(spacecraft.spin)
+    first, second = np.array(law.gauge) * inertia.A / np.array(inertia.moments[:2])
+    across = np.array([first, second, 1.0])
+    channels = tuple(
+        replace(
+            channel,
+            thrusters=tuple(
+                replace(each, torque=across * each.torque) for each in channel.thrusters
+            ),
+        )
+        for channel in spacecraft.channels
+    )
+    omega = complex(law.seen(spacecraft.initial.omega)) * inertia.A / A
+    return replace(
+        spacecraft,
+        inertia=Inertia((A, A, inertia.C), inertia.axes, inertia.wheel),
+        channels=channels,
+        omega0=np.array([omega.real, omega.imag, spacecraft.spin]),
+    )
 
 
 DAY = 86400.0
@@ -730,17 +430,13 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
                 "wired backwards against the sensor"
             )
         expect_in_time(truth, loop)
-        cycles = Map(truth, loop, seed=seed)
-        entries = cycles.entries(truth, seed)
-        ends = list(cycles.attractors(entries))
+        cycles = Cycles(truth, loop, seed=seed)
+        ends = list(cycles.attractors(cycles.of_file))
         # There may be others where a firing can leave more than the stop threshold that no smaller
         # pulse lowers.
         if 0.5 * band.step > loop.stop > 0.0:
             half = complex(cycles.law.size(0.5 * band.step, truth.spin))
-            ends += [
-                *cycles.attractors(),
-                *cycles.attractors([Entry(half, 0.0, active=True, ready=0.0)]),
-            ]
+            ends += [*cycles.attractors(), *cycles.attractors(half)]
         (cycle, share), *rest = ends
         others = (
             each for each, _ in rest if abs(each.pulses - cycle.pulses) > DIFFERENT * cycle.pulses
@@ -749,7 +445,7 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
         if noisy:
             cycle = cycle._replace(doubt=max(cycle.doubt, WIDENED))
         result = replace(result, noisy=noisy, cycle=cycle, share=share, other=next(others, None))
-        return replace(result, band=band, lasts=_lasts(truth, loop, seed, entries))
+        return replace(result, band=band, lasts=_lasts(truth, loop, seed))
     except Infeasible as reason:
         rate = None if result.cycle is None else result.cycle.propellant
         if work.exhausted() and truth.tank is not None and rate:
@@ -759,7 +455,7 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
         return replace(result, band=band, why=SPENT if work.exhausted() else str(reason))
 
 
-def _lasts(spacecraft: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entry]) -> float | None:
+def _lasts(spacecraft: Spacecraft, loop: Loop, seed: int) -> float | None:
     """Lifetime of the limit cycle, s: ∫ dm over the flow, as the pressure in the tank falls."""
     if spacecraft.tank is None:
         return None
@@ -767,8 +463,8 @@ def _lasts(spacecraft: Spacecraft, loop: Loop, seed: int, entries: Sequence[Entr
     total = 0.0
     for done, (share, weight) in enumerate(STAGES, start=1):
         work.reach(done)
-        cycles = Map(spacecraft, loop, used=share * mass, seed=seed)
-        rate = cycles.attractors(entries)[0][0].propellant
+        cycles = Cycles(spacecraft, loop, used=share * mass, seed=seed)
+        rate = cycles.attractors(cycles.of_file)[0][0].propellant
         if rate is None:
             return None
         total += weight / rate

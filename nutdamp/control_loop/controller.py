@@ -422,12 +422,12 @@ class Pilot:
     """Controller of one loop, known on board to the ``law`` and true in the ``case``: from samples
     to firings.
 
-    ``free``: coasts are those of a symmetric body without torque from outside. ``down_to`` rad/s:
-    true |z| to which a firing brings it where the flight is over, as not to be followed further.
+    ``free``: coasts are those of a symmetric body without torque from outside; ``once``: the flight
+    is over as the loop falls quiet.
     """
 
     def __init__(
-        self, law: Law, case: Case, until: float, *, free: bool, down_to: float = 0.0
+        self, law: Law, case: Case, until: float, *, free: bool, once: bool = False
     ) -> None:
         truth = case.truth
         if shed(truth) is not None:
@@ -437,7 +437,7 @@ class Pilot:
         self.truth = truth
         self.loop = truth.loop or law.loop
         self.scatter = case.scatter
-        self.until, self.free, self.down_to = until, free, down_to
+        self.until, self.free, self.once = until, free, once
         self.diagnosis = Diagnosis(2.0 * math.pi / law.period, law.growth, law.spacecraft)
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
@@ -462,12 +462,10 @@ class Pilot:
         work.spend(LOOKED * len(seen.times))
         if self.looked_at > MOST or work.exhausted():
             raise Infeasible(f"{self.looked_at:.2g} samples by {seen.times[0]:.6g} s: {EARLIER}")
-        if self.fired and seen.size <= self.down_to:
-            return Course.OVER
         self._latest = seen
         self._judge(coast, seen)
         self._decision = None if self.ending[0].fault else self._decide(coast, seen)
-        if self.ending[0].fault:
+        if self.ending[0].fault or (self.once and self.quiet):
             return Course.OVER
         if self._decision is not None:
             return self._pulse(self._decision) or Course.OVER

@@ -31,7 +31,7 @@ from nutdamp.flight.end_state import left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import command, reference_model
 from nutdamp.physics import attitude
-from nutdamp.physics.series import NOTHING
+from nutdamp.physics.motion import NOTHING
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.verdict import LOOP, Verdict, judge_loop
 from nutdamp.spacecraft import requirements

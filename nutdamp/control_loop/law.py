@@ -20,9 +20,9 @@ from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import DEFAULT_SHARE
-from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import (
     Windows,
+    at_hand,
     effective_on_time,
     effective_on_times,
     longest_useful,

@@ -40,8 +40,7 @@ from nutdamp.flight.dynamics import Dynamics, Joined, Path, make_dynamics
 from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
 from nutdamp.physics import attitude, energy_sink
-from nutdamp.physics.motion import MOST_STEPS, MotionStretch, advance
-from nutdamp.physics.series import Bodies, Forcing
+from nutdamp.physics.motion import MOST_STEPS, Bodies, Forcing, MotionStretch, advance
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
@@ -71,12 +70,10 @@ class LoopRun:
         case: Case,
         until: float,
         dynamics: Dynamics | None = None,
-        *,
-        down_to: float = 0.0,
     ) -> None:
         own = make_dynamics(case.truth)
         # Free as the body is: so that any integrator flies the same decisions.
-        pilot = self.pilot = Pilot(law, case, until, free=own.free, down_to=down_to)
+        pilot = self.pilot = Pilot(law, case, until, free=own.free)
         self.dynamics = dynamics or own
         self.loop = pilot.loop
         self.until = until
@@ -102,8 +99,7 @@ class LoopRun:
                 state = self._fire(step, begin)
                 now = step.thrust[1]
                 coast = Coast(pilot.law, signal, self.dynamics, state, now)
-        if not pilot.down_to:
-            self._coasted(coast, state, now, max(self.until, now))
+        self._coasted(coast, state, now, max(self.until, now))
         self.fired, self.quiet = tuple(pilot.fired), tuple(pilot.quiet)
         self.settled = self.quiet[0] if self.quiet else None
         self.stop = pilot.ending[0]
@@ -175,11 +171,9 @@ def fly(
     law: Law | None = None,
     scatter: Scatter | None = None,
     dynamics: Dynamics | None = None,
-    down_to: float = 0.0,
 ) -> LoopRun:
     """Fly the loop of a ``spacecraft`` to ``until`` s; ``dynamics`` flies it by another integrator.
 
-    ``down_to`` rad/s: only to the firing that brings |z| down to that, without the coast after it.
     ``law`` is that on board, where it does not know spacecraft and sensor as they are in truth, and
     ``scatter`` what its firings are off by. Raises Infeasible where no law can work, or the flight
     takes too many samples or firings.
@@ -190,7 +184,7 @@ def fly(
         spacecraft if spacecraft.loop is loop else replace(spacecraft, loop=loop), key, scatter
     )
     with work.budget("the loop", work.LOOP):
-        return LoopRun(law or Law(spacecraft, loop), case, end, dynamics, down_to=down_to)
+        return LoopRun(law or Law(spacecraft, loop), case, end, dynamics)
 
 
 def largest_since(run: LoopRun) -> tuple[float, float]:
@@ -318,13 +312,15 @@ def fly_alone(
 
 
 class Fleet:
-    """Loops of ``cases`` flown together to ``until`` s: symmetric bodies without disturbance, see
-    `expects_alone`.
+    """Loops of ``cases`` flown together to ``until`` s, or (``once``) to the last pulse before each
+    falls quiet: symmetric bodies without disturbance, see `expects_alone`.
     """
 
-    def __init__(self, law: Law, cases: Sequence[Case], until: float) -> None:
-        self.law, self.cases, self.until = law, cases, until
-        self.pilots = [Pilot(law, case, until, free=True) for case in cases]
+    def __init__(
+        self, law: Law, cases: Sequence[Case], until: float, *, once: bool = False
+    ) -> None:
+        self.law, self.cases, self.until, self.once = law, cases, until, once
+        self.pilots = [Pilot(law, case, until, free=True, once=once) for case in cases]
         sensors = [pilot.loop.sensor for pilot in self.pilots]
         self.noises = [Noise(case.key, law.loop.sensor) for case in cases]
         self.scales = np.array([sensor.scales for sensor in sensors])
@@ -365,7 +361,8 @@ class Fleet:
                 over = len(self.pilots) - flying
                 watch(over)
         rows = np.arange(len(self.pilots))
-        self._go(rows, np.maximum(self.until, self.now))
+        if not self.once:
+            self._go(rows, np.maximum(self.until, self.now))
         unsettled = np.isinf(self.settled)
         self.largest[unsettled] = self._nutation(rows)[unsettled]
         ends = self.rates, self.quaternion, self.quiet, self.largest

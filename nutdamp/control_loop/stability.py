@@ -216,47 +216,6 @@ class Transfer(NamedTuple):
         """Observed z without noise, numbers or arrays."""
         return self.direct * z + self.mirrored * np.conj(z) + self.offset
 
-    def noise(self, white: ComplexArray) -> ComplexArray:
-        """Noise of the estimates (m, k) by that of the samples (m, n + k), of which the oldest is
-        older than needed.
-        """
-        count = len(self.weights)
-        if count == 1:
-            return np.asarray(self.weights[0] * white[:, :-1])
-        parts = np.lib.stride_tricks.sliding_window_view(white[:, :-1], count, axis=1)
-        return np.asarray(parts @ self.weights[::-1])
-
-    def drawn(self, rng: np.random.Generator, rows: int, count: int) -> ComplexArray:
-        """White noise of samples, (rows, count)."""
-        real, other = self.scatter
-        if real == other == 0.0:
-            return np.zeros((rows, count), dtype=complex)
-        noise = (real * rng.standard_normal((rows, count))).astype(complex)
-        return noise + 1j * other * rng.standard_normal((rows, count)) if other > 0.0 else noise
-
-    def stepped(self, seen: ComplexArray) -> ComplexArray:
-        """Observed z quantised by the steps of a gyro."""
-        if not any(self.grain):
-            return seen
-        raw, (first, second) = seen / self.weights[0], self.grain
-        return np.asarray(
-            self.weights[0]
-            * (np.rint(raw.real / first) * first + 1j * np.rint(raw.imag / second) * second)
-        )
-
-    def change(self, white: ComplexArray, towards: complex, level: float) -> ComplexArray:
-        """Most likely change of the noise that makes the newest estimate ``level`` rad/s in a
-        direction.
-        """
-        newest = self.weights[::-1]
-        pull = newest.conj() * towards
-        real, other = (part * part for part in self.scatter)
-        missing = level - (complex(newest @ white) * towards.conjugate()).real
-        along = real * pull.real + 1j * other * pull.imag
-        return np.asarray(
-            missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along
-        )
-
 
 def transfer(law: Law, spin: float) -> Transfer:
     """Transfer of the estimates of a law at a spin of ``spin`` rad/s."""
@@ -341,20 +300,16 @@ FARTHEST = 1e-12  # share of a threshold below which a nutation is none
 REACH = 12.0  # sigmas of noise within which sizes lie closer together
 PHASES = 16  # directions of z against the bias over which a chance is averaged
 CURVED = 12.0  # sigmas within which a size is so small that noise across it counts
-DEGREES = (
-    240  # terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger
-)
 
 
 class Odds:
-    """First passage: an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows
-    by ``growth`` 1/s.
+    """First passage: an estimate of at least ``limit`` rad/s, while z grows by ``growth`` 1/s.
 
     The chances of the samples add up along a coast: an event is where the sum has come to an
     exponential number.
     """
 
-    def __init__(self, seen: Transfer, limit: float, growth: float, *, below: bool) -> None:
+    def __init__(self, seen: Transfer, limit: float, growth: float) -> None:
         gain, offset = abs(seen.direct), abs(seen.offset)
         reach = offset + REACH * seen.sigma + 1e-6 * limit
         wide = np.geomspace(FARTHEST * (limit + reach), 100.0 * (limit + reach), FINE)
@@ -365,7 +320,6 @@ class Odds:
         turns = np.exp(2j * np.pi * np.arange(phases) / phases)
         sizes = np.abs(shown[:, None] * turns + seen.offset)
         chance = exceeds(limit / sigma, sizes / sigma)
-        chance = 1.0 - chance if below else chance
         chance = (chance * _clustered(seen.fresh, np.abs(limit - sizes) / sigma)).mean(axis=1)
         expected = -np.log1p(-np.minimum(chance, 1.0 - 1e-15)) / (growth * seen.step)
         self.sizes = np.log(shown / gain)
@@ -391,8 +345,10 @@ def _clustered(fresh: float, apart: Vector) -> Any:
     """
     if fresh > 0.5:
         return 1.0
+    from scipy.special import ndtr  # budgets
+
     half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
-    below = _normal(half)
+    below = ndtr(half)
     return (
         2.0
         * half
@@ -401,29 +357,12 @@ def _clustered(fresh: float, apart: Vector) -> Any:
     )
 
 
-def _normal(values: Vector) -> Vector:
-    """Probability that a standard normal number is below each of the ``values``."""
-    scaled = (values.ravel() / -math.sqrt(2.0)).tolist()
-    return 0.5 * np.array([math.erfc(value) for value in scaled]).reshape(values.shape)
-
-
 def exceeds(limit: float, shown: Vector) -> Vector:
-    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction
-    (Rice).
-
-    |shown + n|² is χ² of 2 + 2k degrees of freedom, k by Poisson with the mean shown²/2.
+    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction:
+    |shown + n|² is χ² of 2 degrees of freedom with the noncentrality shown² (Rice).
     """
-    chances = _normal(shown - limit)
-    near = shown < CURVED
-    if limit < 3.0 * CURVED and near.any():
-        mean, half = 0.5 * shown[near] ** 2, 0.5 * limit * limit
-        share, more = np.exp(-mean), math.exp(-half)
-        total = share * more
-        tail = more
-        for number in range(1, DEGREES):
-            share = share * (mean / number)
-            more = more * half / number
-            tail += more
-            total += share * tail
-        chances[near] = total
-    return np.clip(chances, 0.0, 1.0)
+    from scipy.special import chndtr, ndtr  # budgets
+
+    near = (shown < CURVED) & (limit < 3.0 * CURVED)
+    curved = 1.0 - chndtr(limit * limit, 2.0, np.where(near, shown, 0.0) ** 2)
+    return np.asarray(np.where(near, curved, ndtr(shown - limit)))

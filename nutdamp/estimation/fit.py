@@ -442,23 +442,26 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
             *(_settled(model, values) for values in initial_guess.neighbours(model, fitted.values)),
         ]
     )
-    if model.unequal:
-        grown = Model(spacecraft, record)
-        return (
-            _widened(fitted, grown, ("growth",))
-            if _shows_growth(fitted, grown)
-            else _grown_a_little(fitted, grown)
-        )
-    three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
-    begin = _begun(fitted, three)
-    of_moments = _places(three, UNEQUAL_BY)
-    if not _shown(fitted, three, begin, of_moments):
-        return fitted
-    # What unequal moments do may look like growth of equal ones, which then is none.
-    unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
+    begin, unequal = None, fitted
+    if not model.unequal:
+        three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
+        begin = _begun(fitted, three)
+        if not _step(fitted, three, begin, UNEQUAL_BY)[0]:
+            return fitted
+        # What unequal moments do may look like growth of equal ones, which then is none.
+        narrow = Model(spacecraft, record, unequal=True, growing=False)
+        unequal = _widened(fitted, narrow, UNEQUAL_BY)
     grown = Model(spacecraft, record, unequal=True)
-    if not fitted.grows or not _shows_growth(unequal, grown):
-        return _grown_a_little(unequal, grown)
+    if grown.parameter("growth") is None:
+        return unequal
+    shown, values, slopes = _step(unequal, grown, _begun(unequal, grown), ("growth",))
+    if not shown or (begin is not None and not fitted.grows):
+        # Left out growth would be taken as exactly known, and what is known together with it off by
+        # more than its sigma; it is linear where it does not show.
+        return _as_noisy(grown, values, unequal.noise, unequal.used, slopes)
+    if begin is None:
+        return _widened(fitted, grown, ("growth",))
+    of_moments = _places(three, UNEQUAL_BY)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 
@@ -531,36 +534,6 @@ def expect_told(fitted: Fit) -> None:
             f"the record does not determine all of {names}: a sensor is dead, or more "
             "signals are needed"
         )
-
-
-def _shows_growth(narrow: Fit, wider: Model) -> bool:
-    """True where the residuals of a fit of three moments show the
-    dissipation of a ``wider`` model.
-    """
-    which = _places(wider, ("growth",))
-    return bool(which) and _shown(narrow, wider, _begun(narrow, wider), which)
-
-
-def _grown_a_little(narrow: Fit, wider: Model) -> Fit:
-    """A fit of three moments with dissipation that does not show, by one step of least squares: it
-    is linear then.
-
-    Left out it would be taken as exactly known, and what is known together with it off by more than
-    its sigma.
-    """
-    which = _places(wider, ("growth",))
-    if not which:
-        return narrow
-    at = _begun(narrow, wider)
-    used = narrow.used
-    units = units_of(wider)
-    slopes = np.insert(narrow.jacobian, which[0], jacobian(wider, at, which)[:, 0], axis=1)
-    weights = 1.0 / narrow.noise[narrow.model.signal[used]]
-    rows, nominal = wider.prior
-    stacked = np.concatenate([slopes[used] * weights[:, None], rows]) * units
-    target = np.concatenate([narrow.residuals[used] * weights, nominal - rows @ at])
-    values = at + units * np.linalg.lstsq(stacked, target, rcond=1e-13)[0]
-    return _as_noisy(wider, values, narrow.noise, used, slopes)
 
 
 def _begun(narrow: Fit, wider: Model) -> Vector:
@@ -698,22 +671,26 @@ def _as_noisy(
     return Fit(model, values, covariance, noise, used, misfits, slopes)
 
 
-def _shown(fitted: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
-    """True where the residuals show parameters of a wider model: a score test, one step of least
-    squares by them.
+def _step(
+    narrow: Fit, wider: Model, at: Vector, names: Sequence[str]
+) -> tuple[bool, Vector, Matrix]:
+    """One step of least squares from a narrow fit with the parameters ``names`` of a ``wider``
+    model besides, ``at`` its values: whether the residuals show them (score test), its values after
+    the step, and the derivatives by them.
     """
-    model = fitted.model
+    model, used = narrow.model, narrow.used
+    which = _places(wider, names)
+    order = [each.name for each in model.parameters] + [wider.parameters[at].name for at in which]
+    slopes = np.concatenate([narrow.jacobian, jacobian(wider, at, which)], axis=1)
+    units = np.concatenate([units_of(model), units_of(wider)[which]])
+    weights = 1.0 / narrow.noise[model.signal[used]]
+    rows, nominal = model.prior
+    held = np.concatenate([rows, np.zeros((len(rows), len(which)))], axis=1)
+    stacked = np.concatenate([slopes[used] * weights[:, None], held]) * units
+    target = np.concatenate([narrow.residuals[used] * weights, nominal - rows @ narrow.values])
+    solved = np.linalg.lstsq(stacked, target, rcond=1e-13)[0]
+    covariance = np.linalg.pinv(stacked.T @ stacked, rcond=1e-14)
     count = len(which)
-    weights = 1.0 / fitted.noise[model.signal[fitted.used]]
-    slopes = (
-        jacobian(wider, at, which)[fitted.used] * weights[:, None] * units_of(wider)[list(which)]
-    )
-    units = units_of(model)
-    rows = len(model.prior[0])
-    narrow = fitted.jacobian[fitted.used] * weights[:, None] * units
-    bound = np.concatenate([model.prior[0] * units, np.zeros((rows, count))], axis=1)
-    stacked = np.concatenate([np.concatenate([narrow, slopes], axis=1), bound])
-    target = np.concatenate([fitted.residuals[fitted.used] * weights, np.zeros(rows)])
-    solved = np.linalg.lstsq(stacked, target, rcond=1e-13)[0][-count:]
-    covariance = np.linalg.pinv(stacked.T @ stacked, rcond=1e-14)[-count:, -count:]
-    return bool(solved @ np.linalg.solve(covariance, solved) > UNEQUAL**2)
+    size = solved[-count:] @ np.linalg.solve(covariance[-count:, -count:], solved[-count:])
+    columns = [order.index(each.name) for each in wider.parameters]
+    return size > UNEQUAL**2, at + (units * solved)[columns], slopes[:, columns]

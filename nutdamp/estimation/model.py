@@ -34,7 +34,7 @@ from nutdamp.estimation.parameters import (
     tilted,
     turned,
 )
-from nutdamp.flight.dynamics import Arc, FreeCoast, Path, make_dynamics
+from nutdamp.flight.dynamics import Path, free_coast, make_dynamics
 from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, triaxial
 from nutdamp.spacecraft.equipment import ACCELEROMETER
@@ -335,9 +335,7 @@ def _state(path: Path | Flight, time: float) -> SpinState:
 def _coast(body: Body) -> Path:
     """The motion without pulses; of three moments that without dissipation and wheel."""
     inertia, state, growth = body
-    if inertia.symmetric:
-        return Arc(inertia.A, inertia.C, 0.0, state, growth, inertia.wheel, body.sense)
-    return FreeCoast(inertia.moments, 0.0, state)
+    return free_coast(inertia, state, growth=growth, sense=body.sense)
 
 
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:

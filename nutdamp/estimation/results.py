@@ -54,9 +54,8 @@ UNTOLD, SHARED, TOLD, BY_RATIO = "file", "both", "data", "ratio"
 FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell a value
 CORRELATED = 1e-3  # correlations below are left out of files
 DIGITS = 9  # decimals of correlations in files
-LEAST_THRUST = (
-    0.05  # thrust factor down to which a channel did not fire: it is not calibrated by that
-)
+# thrust factor down to which a channel did not fire: it is not calibrated by that
+LEAST_THRUST = 0.05
 WORTH_NAMING = 0.9  # correlation from which on it is named
 
 
@@ -141,8 +140,7 @@ class Carried:
     @property
     def correlation(self) -> Matrix:
         """Correlations (k, k); zero with what is exactly known."""
-        sigmas = self.sigmas
-        scale = np.where(sigmas > 0.0, sigmas, 1.0)
+        scale = np.where(self.sigmas > 0.0, self.sigmas, 1.0)
         return np.asarray(self.covariance / np.outer(scale, scale))
 
 
@@ -331,128 +329,14 @@ def _told(fitted: Fit, function: Callable[[Values], Vector]) -> tuple[Vector, Ma
     return function(fitted.named), np.asarray(slopes @ fitted.covariance @ slopes.T)
 
 
-def _each(fitted: Fit, function: Callable[[Values], Vector]) -> list[tuple[float, float]]:
-    """Values that a function makes of body and motion, with their sigmas."""
-    values, covariance = _told(fitted, function)
-    return list(zip(values.tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True))
-
-
-def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
-    """All that is estimated: the motion at ``time`` s, the body, and the sensors and thrusters."""
-    return (*_of_motion(fitted, time), *_of_body(fitted), *_of_others(fitted))
-
-
-def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
-    model, spacecraft = fitted.model, fitted.model.spacecraft
-    first, begun = model.at(fitted.named, time)
-    x0, y0, _ = first.inertia.axes @ begun.rates  # in the axes of the file
-    phase0 = math.atan2(y0, x0)
-
-    def motion(values: Values) -> Vector:
-        body, state = model.at(values, time)
-        inertia = body.inertia
-        x, y, _ = inertia.axes @ state.rates
-        turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
-        sense = math.copysign(1.0, inertia.axial(state.spin))
-        # |ω| by its part along ω as estimated: at no nutation |ω| has no derivative.
-        along = x * math.cos(phase0) + y * math.sin(phase0)
-        nutation = math.copysign(inertia.cones(state.rates, sense).nutation, along)
-        across = y * math.cos(phase0) - x * math.sin(phase0)
-        return np.array([state.spin, nutation, along, phase0 + turned, across])
-
-    omega = complex(*spacecraft.rates[:2])
-    # Carried to another time the phase is not comparable with that of the file.
-    phase = math.atan2(omega.imag, omega.real) if time == 0.0 else None
-    largest = "" if first.inertia.symmetric else "largest "
-    spin_prior = _sigma_of((spacecraft.dispersions or EXACT).omega0[2], spacecraft.spin)
-    rows = (
-        ("spin", "spin ω3", "deg/s", spacecraft.spin, spin_prior),
-        ("nutation", f"{largest}nutation", "deg", spacecraft.nutation, None),
-        ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
-        ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
-    )
-    values, covariance = _told(fitted, motion)
-    sigmas = np.sqrt(np.diag(covariance))
-    if fitted.steady:
-        # Neither part of ω is seen, and |ω| is off by both: their mean squares add.
-        sigmas[1:3] *= math.hypot(1.0, sigmas[4] / sigmas[2])
-    if not model.record.shows_turn:
-        sigmas[3] = math.inf
-    motions = zip(rows, values[:4].tolist(), sigmas[:4].tolist(), strict=True)
-    for (key, label, unit, file, prior), value, sigma in motions:
-        if key != "phase" or not fitted.steady:  # without nutation there is none
-            yield Estimate(key, label, unit, 1.0 / DEG, value, sigma, file, prior)
-
-
-def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:
-    return None if tolerance is None else prior_of(tolerance, nominal)[1]
-
-
-def _of_body(fitted: Fit) -> Iterator[Estimate]:
-    spacecraft, inertia = fitted.model.spacecraft, fitted.model.spacecraft.inertia
-
-    def body(values: Values) -> Vector:
-        A, C = in_moments(spacecraft, values)
-        return np.array([C / A, 1.0 - C / A, A, C])
-
-    def rate(values: Values) -> Vector:
-        """Rate of a small nutation in the body."""
-        body = fitted.model.body(values)
-        return np.array([body.inertia.nutation_rate(body.state.spin)])
-
-    dispersions = spacecraft.dispersions or EXACT
-    tensor = dispersions.inertia_tensor
-    of_A = _sigma_of(dispersions.A or tensor, inertia.A)
-    of_C = _sigma_of(dispersions.C or tensor, inertia.C)
-    ratio = inertia.C / inertia.A
-    both = ratio * math.hypot((of_A or 0.0) / inertia.A, (of_C or 0.0) / inertia.C) or None
-    rows = (
-        ("C/A", "C/A", "", ratio, both),
-        ("a", "a = 1 - C/A", "", 1.0 - ratio, both),
-        ("A", "A", "kg m²", inertia.A, of_A),
-        ("C", "C", "kg m²", inertia.C, of_C),
-    )
-    alone = fitted.index("A") is None
-    for (key, label, unit, file, prior), (value, sigma) in zip(
-        rows, _each(fitted, body), strict=True
-    ):
-        if sigma > 0.0:
-            by_ratio = alone and key in ("A", "C")
-            yield Estimate(key, label, unit, 1.0, value, sigma, file, prior, by_ratio)
-    if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
-        # Told much better than C/A and ω3, where the file alone tells ω3.
-        file = inertia.nutation_rate(spacecraft.spin)
-        yield Estimate(
-            "rate",
-            "nutation rate in the body",
-            "deg/s",
-            1.0 / DEG,
-            *_each(fitted, rate)[0],
-            file,
-            None,
-        )
-    if fitted.index("wheel") is not None:
-        of_wheel = prior_of(dispersions.wheel_momentum, inertia.wheel)[1]
-        yield Estimate(
-            "wheel",
-            "wheel momentum h",
-            "N m s",
-            1.0,
-            *_at(fitted, "wheel"),
-            inertia.wheel,
-            of_wheel,
-        )
-    others = (
-        ("growth", "growth 1/τ", "1/s"),
-        ("unequal_1", "(I1 - I2)/(I1 + I2)", ""),
-        ("unequal_2", "I12/A", ""),
-    )
-    for key, label, unit in others:
-        if (parameter := fitted.model.parameter(key)) is not None:
-            yield Estimate(key, label, unit, 1.0, *_at(fitted, key), parameter.file, None)
-
+MOTION = ("spin", "nutation", "omega", "phase")  # estimates that differ with the time
 
 LABELS = {
+    "wheel": ("wheel momentum h", "N m s", 1.0),
+    "growth": ("growth 1/τ", "1/s", 1.0),
+    "unequal_1": ("(I1 - I2)/(I1 + I2)", "", 1.0),
+    "unequal_2": ("I12/A", "", 1.0),
+    "bias_acceleration": (f"bias of {ACCELERATION}", "m/s²", 1.0),
     "bias": ("bias of {}", "deg/s", 1.0 / DEG),
     "misalignment": ("gyros tilted about {}", "deg", 1.0 / DEG),
     "wobble": ("axis tilted about {}", "deg", 1.0 / DEG),
@@ -460,25 +344,91 @@ LABELS = {
     "thrust": ("thrust factor of {}", "", 1.0),
     "delay": ("delay of {}", "ms", 1e3),
 }
+"""Label, unit and factor to it of parameters, by name or by its first word."""
+
+OF_BODY = ("wheel", "growth", "unequal_1", "unequal_2")  # of these, shown first
 
 
-def _of_others(fitted: Fit) -> Iterator[Estimate]:
-    for parameter in fitted.model.parameters:
-        kind, _, which = parameter.name.partition(" " if " " in parameter.name else "_")
+def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
+    """All that is estimated: the motion at ``time`` s, the body, and the sensors and thrusters."""
+    model, spacecraft = fitted.model, fitted.model.spacecraft
+    of_file, dispersions = spacecraft.inertia, spacecraft.dispersions or EXACT
+    first, begun = model.at(fitted.named, time)
+    x0, y0, _ = first.inertia.axes @ begun.rates  # in the axes of the file
+    phase0 = math.atan2(y0, x0)
+
+    def shown(values: Values) -> Vector:
+        body, state = model.at(values, time)
+        x, y, _ = body.inertia.axes @ state.rates
+        turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
+        sense = math.copysign(1.0, body.inertia.axial(state.spin))
+        # |ω| by its part along ω as estimated: at no nutation |ω| has no derivative.
+        along = x * math.cos(phase0) + y * math.sin(phase0)
+        across = y * math.cos(phase0) - x * math.sin(phase0)
+        nutation = math.copysign(body.inertia.cones(state.rates, sense).nutation, along)
+        A, C = in_moments(spacecraft, values)
+        # A small nutation turns so: told much better than C/A and ω3 where the file has the spin.
+        rate = body.inertia.nutation_rate(model.body(values).state.spin)
+        motion = [state.spin, nutation, along, phase0 + turned]
+        return np.array([*motion, C / A, 1.0 - C / A, A, C, rate, across])
+
+    omega = complex(*spacecraft.rates[:2])
+    # Carried to another time the phase is not comparable with that of the file.
+    phase = math.atan2(omega.imag, omega.real) if time == 0.0 else None
+    largest = "" if first.inertia.symmetric else "largest "
+    spin_prior = _sigma_of(dispersions.omega0[2], spacecraft.spin)
+    of_A = _sigma_of(dispersions.A or dispersions.inertia_tensor, of_file.A)
+    of_C = _sigma_of(dispersions.C or dispersions.inertia_tensor, of_file.C)
+    ratio, rate = of_file.C / of_file.A, of_file.nutation_rate(spacecraft.spin)
+    both = ratio * math.hypot((of_A or 0.0) / of_file.A, (of_C or 0.0) / of_file.C) or None
+    rows = (
+        ("spin", "spin ω3", "deg/s", spacecraft.spin, spin_prior),
+        ("nutation", f"{largest}nutation", "deg", spacecraft.nutation, None),
+        ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
+        ("phase", "phase arg(ω1 + iω2)", "deg", phase, None),
+        ("C/A", "C/A", "", ratio, both),
+        ("a", "a = 1 - C/A", "", 1.0 - ratio, both),
+        ("A", "A", "kg m²", of_file.A, of_A),
+        ("C", "C", "kg m²", of_file.C, of_C),
+        ("rate", "nutation rate in the body", "deg/s", rate, None),
+    )
+    values, covariance = _told(fitted, shown)
+    sigmas = np.sqrt(np.diag(covariance))
+    if fitted.steady:
+        # Neither part of ω is seen, and |ω| is off by both: their mean squares add.
+        sigmas[1:3] *= math.hypot(1.0, sigmas[9] / sigmas[2])
+    if not model.record.shows_turn:
+        sigmas[3] = math.inf
+    left_out = {"phase"} if fitted.steady else set()  # without nutation there is none
+    if model.record.shows_spin or not model.record.shows_turn:
+        left_out.add("rate")
+    made = []
+    for (key, label, unit, file, prior), value, sigma in zip(
+        rows, values.tolist(), sigmas.tolist(), strict=False
+    ):
+        if key not in left_out and (sigma > 0.0 or key in MOTION):
+            factor = 1.0 / DEG if unit.startswith("deg") else 1.0
+            by_ratio = key in ("A", "C") and fitted.index("A") is None
+            made.append(Estimate(key, label, unit, factor, value, sigma, file, prior, by_ratio))
+    for parameter in sorted(model.parameters, key=lambda each: each.name not in OF_BODY):
+        name = parameter.name
+        kind, _, which = name.partition(" " if " " in name else "_")
+        told = LABELS.get(name) or LABELS.get(kind)
+        prior = thrust_prior(spacecraft, which)[1] if kind == "thrust" else parameter.prior
         # An attitude without tolerance is told by the data alone.
-        if kind not in LABELS or (kind == "attitude" and math.isinf(parameter.prior)):
+        if told is None or (kind == "attitude" and math.isinf(prior)):
             continue
-        label, unit, factor = LABELS[kind]
-        if which == "acceleration":
-            unit, factor = "m/s²", 1.0
-        value, sigma = _at(fitted, parameter.name)
-        of_file = (
-            thrust_prior(fitted.model.spacecraft, which)[1] if kind == "thrust" else parameter.prior
+        label, unit, factor = told
+        known = prior if math.isfinite(prior) else None
+        value, sigma = _at(fitted, name)
+        made.append(
+            Estimate(name, label.format(which), unit, factor, value, sigma, parameter.file, known)
         )
-        prior = of_file if math.isfinite(of_file) else None
-        yield Estimate(
-            parameter.name, label.format(which), unit, factor, value, sigma, parameter.file, prior
-        )
+    return tuple(made)
+
+
+def _sigma_of(tolerance: Tolerance | None, nominal: float) -> float | None:
+    return None if tolerance is None else prior_of(tolerance, nominal)[1]
 
 
 def _at(fitted: Fit, name: str) -> tuple[float, float]:
@@ -502,10 +452,8 @@ def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
     )
 
 
-FAR, REFUSED = (
-    3.0,
-    5.0,
-)  # sigmas of the file by which a constant is off that is said, and that is not accepted
+# sigmas of the file by which a constant is off that is said, and that is not accepted
+FAR, REFUSED = 3.0, 5.0
 UNSAID = 0.1  # tolerance of C/A, of unequal moments and of thrust where the file gives none
 OTHER_SPIN = 0.01  # part by which a spin is off that is said
 
@@ -515,19 +463,19 @@ def far_from_file(fitted: Fit, beyond: float = FAR) -> list[tuple[Estimate, floa
     how many.
     """
     far = []
-    for row in (*_of_body(fitted), *_of_others(fitted)):
+    for row in estimates(fitted, fitted.model.start):
         file = row.file or 0.0
         usual = row.key.startswith((RATIO, "unequal", "thrust"))
         unsaid = UNSAID * (file if row.key == RATIO else 1.0) if usual else math.inf
         off = (row.value - file) / math.hypot(row.prior or unsaid, row.sigma)
-        if row.key != "a" and abs(off) > beyond:
+        if row.key not in (*MOTION, "a") and abs(off) > beyond:
             far.append((row, off))
     return far
 
 
 def spin_off(fitted: Fit) -> tuple[float, float] | None:
     """The spin at the start of the record and that of the file, rad/s, where they differ."""
-    row = next(_of_motion(fitted, fitted.model.start))
+    row = estimates(fitted, fitted.model.start)[0]
     file = fitted.model.spacecraft.spin
     noticed = min(FAR * row.prior if row.prior else math.inf, OTHER_SPIN * abs(file) or math.inf)
     return (row.value, file) if abs(row.value - file) > max(noticed, FAR * row.sigma) else None
@@ -555,9 +503,7 @@ UNITS = (
 )
 FASTER = 5.0  # times the file's transverse rate from which on units are doubted
 SAME = 1.3  # times it up to which a motion is the file's
-ALIKE = (
-    2.0  # times the distance of the nearest motion from the file up to which others count as well
-)
+ALIKE = 2.0  # times the distance of the nearest motion from the file up to which others count too
 # part of C/A and of the spin by which the start of a fit may be off the file to be followed
 NEAR = 0.35
 
@@ -697,8 +643,17 @@ def doubts(fitted: Fit) -> Iterator[Note]:
         yield note("fit-unequal-moments", apart_percent=apart)
     if not model.record.shows_turn:
         yield note("fit-phase-of-file", signals=", ".join(model.signals))
-    yield from _of_residuals(fitted)
     record = model.record
+    if coloured := _coloured(fitted):
+        signals = ", ".join(model.signals[index] for index in coloured)
+        if (time := step(fitted, coloured, small=True)) is None:
+            yield note("fit-not-white", signals=signals)
+        else:
+            yield note(
+                "fit-steps-beside-schedule" if record.fired else "fit-steps",
+                signals=signals,
+                at_s=time,
+            )
     outside = len(record.schedule) - len(record.fired)
     if outside:
         span = {"start_s": record.start, "end_s": record.end}
@@ -712,21 +667,6 @@ def _coloured(fitted: Fit) -> list[int]:
         for index in range(len(fitted.model.signals))
         if fitted.resolved[index] and not fitted.white(index)
     ]
-
-
-def _of_residuals(fitted: Fit) -> Iterator[Note]:
-    """Possible cause of residuals that are not white, and the cure."""
-    coloured = _coloured(fitted)
-    if not coloured:
-        return
-    signals = ", ".join(fitted.model.signals[index] for index in coloured)
-    if (time := step(fitted, coloured, small=True)) is not None:
-        fired = fitted.model.record.fired
-        yield note(
-            "fit-steps-beside-schedule" if fired else "fit-steps", signals=signals, at_s=time
-        )
-    else:
-        yield note("fit-not-white", signals=signals)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,32 +1,28 @@
 """Geometry of the pictures of a flight: directions as angles, rolling cones, stretches of the
-track. No matplotlib.
+track. Only `ticks` loads matplotlib.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude, triaxial
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Schedule
-
-Item = TypeVar("Item")
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 ROWS_A_TURN = 60  # rows in a nutation period from which a polygon looks like the curve
-MOST_ROWS = (
-    30_000  # largest number of rows of a picture; a longer track is drawn as far as they reach
-)
+# largest number of rows of a picture; a longer track is drawn as far as they reach
+MOST_ROWS = 30_000
 RIM = 121  # points around the rim of a cone
 LEAST = 1e-9  # degrees or deg/s below which a motion is drawn as a point
 
-CLOSE = (
-    1.0 / 125.0
-)  # part of the time shown below which firings cannot be distinguished: 4 points on a sheet
+# part of the time shown below which firings cannot be distinguished: 4 points on a sheet
+CLOSE = 1.0 / 125.0
 MANY = 3  # least number of firings drawn as one
 
 NO_CONE = 1e-10  # half-angle in rad below which a cone is not distinguished from its axis
@@ -71,18 +67,10 @@ def channels_fired(flight: Flight) -> list[str]:
     return sorted(used, key=lambda name: order.index(name) if name in order else -1)
 
 
-class TrackPiece(NamedTuple):
-    """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that
-    fires, from 0.
+def stretches(flight: Flight, track: Track) -> Iterator[tuple[slice, int | None]]:
+    """Rows of the track cut where pulses begin and end, in order, each with the number of the pulse
+    that fires in them, from 0. Neighbours share a row; an impulse has two of its own.
     """
-
-    first: int
-    last: int
-    pulse: int | None
-
-
-def stretches(flight: Flight, track: Track) -> Iterator[TrackPiece]:
-    """The track cut where pulses begin and end, in order; an impulse is a stretch of two rows."""
     now = 0
     last = len(track.t) - 1
     for number, (begins, ends) in enumerate(flight.spans):
@@ -91,67 +79,46 @@ def stretches(flight: Flight, track: Track) -> Iterator[TrackPiece]:
         first = max(now, int(np.searchsorted(track.t, begins, side="left")))
         until = max(first, min(last, int(np.searchsorted(track.t, ends, side="right")) - 1))
         if first > now:
-            yield TrackPiece(now, first, None)
-        yield TrackPiece(first, until, number)
+            yield slice(now, first + 1), None
+        yield slice(first, until + 1), number
         now = until
     if now < last:
-        yield TrackPiece(now, last, None)
+        yield slice(now, last + 1), None
 
 
 class FiredBlock(NamedTuple):
-    """Pulses ``first`` to ``last``, numbered from 1, from ``begins`` to ``ends`` s; ``on`` s of it
-    something fires.
+    """Firings from pulse ``first`` on, numbered from 1, that are drawn as one: how ``many``, their
+    numbers as text, from ``begins`` to ``ends`` s; ``on`` s of it something fires.
     """
 
     first: int
-    last: int
     many: int
+    name: str
     begins: float
     ends: float
     on: float
-
-    @property
-    def name(self) -> str:
-        """Its numbers as text."""
-        if self.many == 1:
-            return str(self.first)
-        between = "–" if self.many == self.last - self.first + 1 else " … "
-        return f"{self.first}{between}{self.last}"
 
 
 def blocks(flight: Flight, until: float, channel: str | None = None) -> list[FiredBlock]:
     """The firings of a channel, or of all, up to ``until`` s; `MANY` or more that begin `CLOSE`
     together are one.
     """
-    firings = [
-        (number, pulse)
-        for number, pulse in enumerate(flight.schedule, start=1)
-        if pulse.start <= until and channel in (None, pulse.channel)
-    ]
+    groups: list[list[tuple[int, Pulse]]] = []
+    for number, pulse in enumerate(flight.schedule, start=1):
+        if pulse.start <= until and channel in (None, pulse.channel):
+            if not groups or pulse.start - groups[-1][-1][1].start >= CLOSE * until:
+                groups.append([])
+            groups[-1].append((number, pulse))
     fired = []
-    for part in runs(
-        firings, lambda one, next_: next_[1].start - one[1].start < CLOSE * until, MANY
-    ):
-        ends = max(pulse.end for _, pulse in part)
-        on = sum(pulse.on_time for _, pulse in part)
-        fired.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
+    for group in groups:
+        for part in [group] if len(group) >= MANY else [[alone] for alone in group]:
+            numbers, pulses = zip(*part, strict=True)
+            between = "–" if len(part) == numbers[-1] - numbers[0] + 1 else " … "
+            name = between.join(map(str, dict.fromkeys((numbers[0], numbers[-1]))))
+            ends = max(pulse.end for pulse in pulses)
+            on = sum(pulse.on_time for pulse in pulses)
+            fired.append(FiredBlock(numbers[0], len(part), name, pulses[0].start, ends, on))
     return fired
-
-
-def runs(items: Sequence[Item], near: Callable[[Item, Item], bool], least: int) -> list[list[Item]]:
-    """Items together where each is ``near`` the one before and there are ``least`` of them; all
-    others alone.
-    """
-    groups: list[list[Item]] = []
-    for item in items:
-        if not groups or not near(groups[-1][-1], item):
-            groups.append([])
-        groups[-1].append(item)
-    return [
-        part
-        for group in groups
-        for part in ([group] if len(group) >= least else [[alone] for alone in group])
-    ]
 
 
 def sky_plane(flight: Flight, momentum: Vector) -> Vector:
@@ -203,11 +170,6 @@ def off_sky(plane: Vector, angles: Vector) -> Vector:
     return np.asarray(np.cos(away) * plane[2] + np.sinc(away / math.pi) * turns @ plane[:2])
 
 
-def pole_path(track: Track) -> Vector:
-    """(n, 2): ω1 and ω2 in deg/s, the pole curve (Magnus 1970 fig. 5)."""
-    return np.asarray(np.degrees(track.rates[:, :2]), dtype=np.float64)
-
-
 def pole_note(flight: Flight) -> str:
     """Words behind the names of the axes of the pole curve;
     empty where they are those of the file.
@@ -217,39 +179,18 @@ def pole_note(flight: Flight) -> str:
     return f"{axes}, spin about −3" if spacecraft.spin < 0.0 else axes
 
 
-def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
-    """(n, 2) each: spin axis and H as angles from H(0) in degrees (Magnus 1970 fig. 6-8)."""
-    plane = sky_plane(flight, track.momentum[0])
-    return on_sky(plane, track.axis), on_sky(plane, track.momentum)
-
-
 def aimed(flight: Flight) -> Vector:
     """(n, 3): the target axis, or none."""
-    return (
-        np.empty((0, 3))
-        if flight.spacecraft.goal.axis is None
-        else flight.spacecraft.goal.axis[None]
-    )
+    goal = flight.spacecraft.goal.axis
+    return np.empty((0, 3)) if goal is None else goal[None]
 
 
-def sky_target(flight: Flight, track: Track) -> Vector:
-    """(n, 2): the target axis in the same angles; empty where there is none."""
-    return on_sky(sky_plane(flight, track.momentum[0]), aimed(flight))
-
-
-def once(points: Vector) -> Vector:
-    """A path (n, 2), broken by NaN where it goes straight back: dashes drawn both ways would fill
-    each other's gaps.
+def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector, Vector]:
+    """(n, 2) each: spin axis, H and target, if any, as angles from H(0) in degrees (Magnus 1970
+    fig. 6-8).
     """
-    grain = 1e-6 * max(float(np.ptp(points, axis=0).max()), 1e-9)
-    places = [tuple(place) for place in np.round(points / grain).astype(np.int64).tolist()]
-    drawn: set[tuple[tuple[int, ...], tuple[int, ...]]] = set()
-    kept = [points[0]]
-    for first, second, point in zip(places, places[1:], points[1:], strict=False):
-        back = first != second and (second, first) in drawn
-        kept += [np.full(2, math.nan), point] if back else [point]
-        drawn.add((first, second))
-    return np.array(kept)
+    plane = sky_plane(flight, track.momentum[0])
+    return on_sky(plane, track.axis), on_sky(plane, track.momentum), on_sky(plane, aimed(flight))
 
 
 def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
@@ -264,38 +205,27 @@ def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector
 
 
 def hull(points: Vector) -> Vector:
-    """Corners (m, 2) of the convex hull of ``points`` (n, 2), counterclockwise (Andrew's monotone
-    chain).
+    """Corners (m, 2) of the convex hull of ``points`` (n, 2), counterclockwise; of points on a line
+    its ends.
     """
-    ordered = sorted(set(map(tuple, points.tolist())))
-    if len(ordered) < 3:
-        return np.array(ordered).reshape(-1, 2)
-    sides = []
-    for run in (ordered, ordered[::-1]):
-        side: list[tuple[float, ...]] = []
-        for x, y in run:
-            while len(side) > 1:
-                (x0, y0), (x1, y1) = side[-2:]
-                if (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0):
-                    break
-                side.pop()
-            side.append((x, y))
-        sides += side[:-1]
-    return np.array(sides)
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except (QhullError, ValueError):
+        ends = points[np.lexsort(points.T[::-1])[[0, -1]]]
+        return np.unique(ends, axis=0)
 
 
 def ticks(low: float, high: float, most: int) -> list[float]:
-    """At most ``most`` round numbers from ``low`` to ``high``, a step of 1, 2 or 5 times a power of
-    ten apart.
+    """At most ``most`` + 1 round numbers from ``low`` to ``high``, 1, 2 or 5 times a power of ten
+    apart.
     """
-    rough = (high - low) / max(most, 1)
-    decade = 10.0 ** math.floor(math.log10(rough))
-    step = next(
-        unit * decade for unit in (1.0, 2.0, 5.0, 10.0, 20.0) if unit * decade >= rough * (1 - 1e-9)
-    )
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
-    return [count * step + 0.0 for count in range(first, last + 1)]
+    from matplotlib.ticker import MaxNLocator
+
+    edge = 1e-9 * (high - low)
+    values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
+    return [float(value) for value in values if low - edge <= value <= high + edge]
 
 
 class DrawnCones(NamedTuple):

@@ -108,18 +108,16 @@ FILMS = ("gif", "mp4")
 TALL = 0.75  # height of a frame over its width: square panels of half the width above a strip
 INCHES = 8.0  # width of the sheet that fills a frame, inches: more pixels only make it finer
 
+# shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white
 LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
-"""Shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white."""
 
+# frames in a nutation turn from which the eye follows it; with fewer than half of them it may see
+# it backwards
 SMOOTH = 12.0
-"""Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see
-it backwards.
-"""
 
 SHORTEST, LONGEST = 6.0, 30.0  # seconds of a film whose length is not given
-MARKED = math.radians(
-    60.0
-)  # turn of the body from frame to frame up to which a mark on it shows how it rolls
+# turn of the body from frame to frame up to which a mark on it shows how it rolls
+MARKED = math.radians(60.0)
 FRAMED = 300  # frames by whose cones the scales are laid out, evenly over the film
 HELD = 0.4  # seconds of film that a firing stays announced, however short it is
 
@@ -272,7 +270,7 @@ class Scene:
         overview.nutation_history(self.strip, flight, self.path)
         self.strip.set(xlabel=overview.TIME)
         sphere.name_directions(self.sky)
-        style.legend(figure, [self.sky, self.strip], 5)
+        style.legend(figure, [self.sky, self.strip])
         self.title = figure.suptitle(self.caption(0.0))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # from now on nothing may move but the motion

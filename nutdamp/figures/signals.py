@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,32 +29,44 @@ if TYPE_CHECKING:
 
 SAMPLES = 3000  # rows of the nutation of a run
 DECADES = 5.0  # largest number of decades of the nutation on its log axis
-
 PERIODS = 4.0  # cycles drawn of the longest limit cycle
-
-ROWS = 600
+ROWS = 600  # rows of the nutation without firing
 
 
 @style.styled()
 def loop_figure(plan: LoopPlan) -> Figure:
-    """Nutation with thresholds and dead band above the firings, and what holding it takes."""
+    """Nutation on a log axis with thresholds, dead band and the nutation seen at each firing, above
+    the firings, and what holding it takes.
+    """
     run = plan.flown_run
     unit, seconds = time_unit(run.until)
     heights = [2.6, *firings_height(run.flight)]
     figure = style.sheet(7.4, 1.8 + sum(heights))
-    panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights, sharex=True)[
-        :, 0
-    ]
-    _nutation(panels[0], plan)
+    panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights, sharex=True)
+    axes, last = panels[0, 0], panels[-1, 0]
+    track = run.flight.sampled(SAMPLES, run.until)
+    angles = np.degrees(track.nutation)
+    start, stop, band = np.degrees([run.loop.start, run.loop.stop, plan.band.most]).tolist()
+    most = max(float(angles.max()), start)
+    lowest = min(float(angles.min()), stop or start, band or start)
+    low = max(0.5 * lowest, most * 10.0**-DECADES)
+    axes.plot(track.t, np.maximum(angles, 0.1 * low), color=MOTION, label="nutation θ")
     if run.fired:
-        firings(panels[1], run.flight, run.until)
-    panels[0].set_xlim(-EDGE * run.until, run.until)
-    panels[0].set_title(upkeep(plan), loc="right", **style.NOTE)
+        seen = [(firing.pulse.t, max(math.degrees(firing.seen), low)) for firing in run.fired]
+        axes.plot(*np.transpose(seen), "x", color=PULSE, markersize=4, label="θ seen at a firing")
+        firings(last, run.flight, run.until)
+    for name, level, line in (("start", start, "--"), ("stop", stop, ":")):
+        if level > 0.0:
+            axes.axhline(level, color=GREY, linewidth=0.9, linestyle=line, label=name)
+    axes.axhspan(0.1 * low, max(band, 0.1 * low), label="dead band", **style.BAND)
+    style.log_angles(axes, low, 2.0 * most)
+    axes.set_xlim(-EDGE * run.until, run.until)
+    axes.set_title(upkeep(plan), loc="right", **style.NOTE)
     if seconds > 1.0:  # the panels are drawn over seconds
         times = np.array(ticks(0.0, run.until / seconds, 7))
-        panels[-1].set_xticks(seconds * times, [f"{time:g}" for time in times])
-    panels[-1].set_xlabel(f"time, {unit}")
-    style.legend(figure, list(panels))
+        last.set_xticks(seconds * times, [f"{time:g}" for time in times])
+    last.set_xlabel(f"time, {unit}")
+    style.legend(figure, figure.axes)
     loop = described(run.loop, thresholds=False).replace(" deg", "°")
     return style.finished(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
 
@@ -84,27 +97,6 @@ def upkeep(plan: LoopPlan) -> str:
     return f"{text}, {style.number(math.fsum(masses) / lasts * YEAR)} kg a year"
 
 
-def _nutation(axes: Axes, plan: LoopPlan) -> None:
-    """Nutation on a log axis, thresholds, dead band, and the nutation seen at each firing."""
-    run = plan.flown_run
-    track = run.flight.sampled(SAMPLES, run.until)
-    angles = np.degrees(track.nutation)
-    start, stop = math.degrees(run.loop.start), math.degrees(run.loop.stop)
-    band = math.degrees(plan.band.most)
-    most = max(float(angles.max()), start)
-    lowest = min(float(angles.min()), stop or start, band or start)
-    low = max(0.5 * lowest, most * 10.0**-DECADES)
-    axes.plot(track.t, np.maximum(angles, 0.1 * low), color=MOTION, label="nutation θ")
-    seen = [(firing.pulse.t, max(math.degrees(firing.seen), low)) for firing in run.fired]
-    if seen:
-        axes.plot(*np.transpose(seen), "x", color=PULSE, markersize=4, label="θ seen at a firing")
-    axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
-    if stop > 0.0:
-        axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")
-    axes.axhspan(0.1 * low, max(band, 0.1 * low), label="dead band", **style.BAND)
-    style.log_angles(axes, low, 2.0 * most)
-
-
 @style.styled()
 def budget_figure(budget: Budget) -> Figure:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
@@ -127,24 +119,25 @@ def budget_figure(budget: Budget) -> Figure:
     times = np.linspace(0.0, size, ROWS)
     free = np.degrees(requirements.idle(spacecraft, times))
     axes.plot(times / seconds, free, color=INK, label="no firing")
-    looks = style.LOOKS
-    for (thresholds, cycle, period, begins), (colour, _, line) in zip(held, looks, strict=False):
+    highest, lows = [float(free[0])], []
+    for (thresholds, cycle, period, begins), (colour, _, line) in zip(
+        held, style.LOOKS, strict=False
+    ):
         low, high = math.degrees(cycle.low), math.degrees(cycle.high)
-        rises = (
-            min(requirements.reached(spacecraft, cycle.high, cycle.low), period)
-            if high > low > 0.0
-            else period
-        )
+        rises = period
+        if high > low > 0.0:
+            rises = min(requirements.reached(spacecraft, cycle.high, cycle.low), period)
         starts = begins + period * np.arange(max(math.ceil((size - begins) / period), 0))
         drawn = np.stack([starts, starts + period - rises, starts + period], axis=1).ravel()
         name = f"{style.angle(thresholds.start)} to {style.angle(thresholds.stop)}"
         angles = np.tile([low, low, high], len(starts))
         axes.plot(drawn / seconds, angles, color=colour, linestyle=line, label=name)
+        highest.append(math.degrees(cycle.largest))
+        lows.append(low)
     if budget.largest is not None:
-        axes.axhline(math.degrees(budget.largest), **{**style.LIMIT, "label": "largest allowed"})
-    highest = [math.degrees(cycle.largest) for _, cycle, _, _ in held]
-    top = max([*highest, math.degrees(budget.largest or 0.0), float(free[0])])
-    lows = [math.degrees(cycle.low) for _, cycle, _, _ in held]
+        highest.append(math.degrees(budget.largest))
+        axes.axhline(highest[-1], **{**style.LIMIT, "label": "largest allowed"})
+    top = max(highest)
     style.log_angles(axes, 0.5 * min([*lows, max(float(free.min()), 1e-3 * top)]), 3.0 * top)
     axes.set(xlabel=f"time, {unit}", xlim=(0.0, size / seconds))
     style.legend(figure, [axes])
@@ -154,14 +147,12 @@ def budget_figure(budget: Budget) -> Figure:
 
 # standard deviations to either side that residuals are drawn to; outliers beyond are marked at the
 # edge
-SPREAD = 6.0
+SPREAD = 6.0  # twice the three that are marked
 
+# share of the noise taken for the digits below which all residuals are rounding: of real noise some
+# are above it
 ROUNDING = 1e-3
-"""Share of the noise taken for the digits below which all residuals are rounding: of real noise
-some are above it.
-"""
-
-ROWS = 8  # labels of pulls that fit into half of the height
+LABELS = 8  # labels of pulls that fit into half of the height
 FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 
@@ -173,35 +164,28 @@ def fit_figure(fitted: Fitted) -> Figure:
     from nutdamp.estimation.results import estimates
 
     fit = fitted.core
-    every = range(len(fit.model.signals))
-    shown = [index for index in every if not _rounding(fit, index)] or [0]
+    noisy = [index for index in range(len(fit.model.signals)) if not _rounding(fit, index)]
+    shown = noisy or [0]
     exact = [name for index, name in enumerate(fit.model.signals) if index not in shown]
     pulled = [row for row in estimates(fit, 0.0) if row.change is not None and row.prior]
-    correlated = [
-        index for index in shown if len(fit.whiteness(index)) and not _rounding(fit, index)
-    ]
-    aside = bool(correlated) + bool(pulled)
+    correlated = [index for index in noisy if len(fit.whiteness(index))]
+    aside: list[tuple[Callable[[Axes], None], float]] = []
+    if correlated:
+        aside.append((partial(_autocorrelation, fit=fit, shown=correlated), 1.0))
+    if pulled:
+        aside.append((partial(_pulls, rows=pulled), max(1.0, len(pulled) / LABELS)))
     figure = style.sheet(8.6 if aside else 5.4, max(4.8, 1.2 + 1.15 * len(shown)))
     sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0 if aside else 1e-3])
-    left = sides[0].subgridspec(len(shown), 1).subplots(sharex=True, squeeze=False)[:, 0].tolist()
+    left = sides[0].subgridspec(len(shown), 1).subplots(sharex=True, squeeze=False)[:, 0]
     for index, axes in zip(shown, left, strict=True):
         _residuals(axes, fit, index)
     times = fit.model.times
     left[0].set(title="Residuals: data less fit", xlim=(times.min(), times.max()))
-    left[-1].set_xlabel(TIME)
-    if exact:
-        left[-1].set_xlabel(f"{TIME}\nonly rounding: {', '.join(exact)}")
-    right: list[Axes] = []
-    if aside:
-        rows = max(1.0, len(pulled) / ROWS)
-        heights = [1.0] * (aside - 1) + [rows if pulled else 1.0]
-        beside = sides[1].subgridspec(aside, 1, height_ratios=heights)
-        right = beside.subplots(squeeze=False)[:, 0].tolist()
-    if correlated:
-        _autocorrelation(right[0], fit, correlated)
-    if pulled:
-        _pulls(right[-1], pulled)
-    style.legend(figure, [*left, *right])
+    left[-1].set_xlabel(f"{TIME}\nonly rounding: {', '.join(exact)}" if exact else TIME)
+    for row, (draw, _) in enumerate(aside):
+        beside = sides[1].subgridspec(len(aside), 1, height_ratios=[size for _, size in aside])
+        draw(figure.add_subplot(beside[row]))
+    style.legend(figure, figure.axes)
     shape = "symmetric" if fit.model.body(fit.named).inertia.symmetric else "triaxial"
     count = int(np.count_nonzero(fit.used))
     about = f"fit of a free rigid body, {shape}, to {count:,} samples"
@@ -224,20 +208,12 @@ def _residuals(axes: Axes, fit: Fit, index: int) -> None:
     left = np.clip(factor * fit.residuals[rows], -limit, limit)
     kept = fit.used[rows]
     times = fit.model.times[rows]
-    axes.plot(
-        times[kept],
-        left[kept],
-        color=style.LOOKS[index % len(style.LOOKS)][0],
-        linestyle="",
-        marker=".",
-        markersize=2.0,
-    )
+    colour, *_ = style.LOOKS[index % len(style.LOOKS)]
+    axes.plot(times[kept], left[kept], ".", color=colour, markersize=2.0)
     if not kept.all():
-        axes.plot(times[~kept], left[~kept], color=INK, linestyle="", marker="x", label="left out")
-    for side in (-3.0, 3.0):
-        axes.axhline(
-            side * factor * noise, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma"
-        )
+        axes.plot(times[~kept], left[~kept], "x", color=INK, label="left out")
+    for side in (-0.5 * limit, 0.5 * limit):
+        axes.axhline(side, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma")
     axes.set_ylim(-1.08 * limit, 1.08 * limit)
     axes.grid()
 
@@ -260,21 +236,14 @@ def _autocorrelation(axes: Axes, fit: Fit, shown: Sequence[int]) -> None:
         name = fit.model.signals[index]
         axes.plot(lags, correlations, color=colour, linestyle=line, linewidth=1.0, label=name)
         bands.append(1.96 / np.sqrt(int((fit.used & (fit.model.signal == index)).sum())))
-    axes.axhspan(
-        -max(bands),
-        max(bands),
-        facecolor=GREY,
-        alpha=0.25,
-        linewidth=0.0,
-        label="95 % of white noise",
-    )
+    axes.axhspan(-max(bands), max(bands), label="95 % of white noise", **style.BAND)
     most = max(float(np.abs(line.get_ydata()).max()) for line in axes.lines)
     size = min(1.0, 1.15 * max(most, 2.0 * max(bands)))
     axes.set(xlabel="lag, samples", ylim=(-size, size))
     axes.grid()
 
 
-def _pulls(axes: Axes, rows: list[Estimate]) -> None:
+def _pulls(axes: Axes, rows: Sequence[Estimate]) -> None:
     """Value less that of the file, with one sigma after the fit,
     both over the sigma of the file.
     """
@@ -282,7 +251,7 @@ def _pulls(axes: Axes, rows: list[Estimate]) -> None:
     places = -np.arange(len(rows), dtype=float)
     changes = np.clip([row.change or 0.0 for row in rows], -FARTHEST, FARTHEST)
     sigmas = [min(row.sigma / (row.prior or 1.0), FARTHEST) for row in rows]
-    axes.axvspan(-1.0, 1.0, facecolor=GREY, alpha=0.25, linewidth=0.0)
+    axes.axvspan(-1.0, 1.0, **style.BAND)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.errorbar(
         changes, places, xerr=sigmas, fmt="o", color=MOTION, markersize=4, elinewidth=1.2, capsize=2

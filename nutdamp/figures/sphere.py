@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,27 +18,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-ELEVATION = math.radians(
-    28.0
-)  # direction from which the sphere is seen: above the plane square to H(0)
+# direction from which the sphere is seen: above the plane square to H(0)
+ELEVATION = math.radians(28.0)
 STEEPEST = math.radians(65.0)  # elevation of the globe where all that it shows is near H(0)
-ASIDE = math.radians(
-    65.0
-)  # the spin axis leans to the right at t = 0, this far round from the viewer
+# the spin axis leans to the right at t = 0, this far round from the viewer
+ASIDE = math.radians(65.0)
 MOVES = math.radians(2.0)  # motion of the spin axis below which it is a point on the globe
 
+# below the first angle from H(0) everything is magnified, to the second one at most
 WIDE, DRAWN = math.radians(20.0), math.radians(42.0)
-"""Below the first angle from H(0) everything is magnified, to the second one at most."""
+STEPS = (1.0, 2.0, 3.0, 5.0)
 
 SPACE, BODY = 0.28, 0.15  # opacity of the cones: distinguished in grey print too
 # width of rims and edges of cones, points: thinner than the path of the spin axis, which shares
 # their colour
 RIM = 0.7
 
+# marks in the plane picture, colours and names of the three directions that lie in one plane
 DIRECTIONS = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"))
-"""Marks in the plane picture, colours and names of the three directions that lie in one plane."""
-
-STEPS = (1.0, 2.0, 3.0, 5.0)
 
 
 class View(NamedTuple):
@@ -108,7 +104,9 @@ def has_globe(flight: Flight, track: Track) -> bool:
 
 
 def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the spin axis on the sphere, with target, Sun and cones to keep on its front."""
+    """Path of the spin axis on the sphere, with target, Sun and cones to keep on its front: the
+    direction of each, and the circles between which the spin axis is to stay.
+    """
     cones = directed(flight)
     plane = geometry.sky_plane(flight, track.momentum[0])
     directions = [direction for _, direction in cones]
@@ -118,47 +116,32 @@ def draw_globe(axes: Axes, flight: Flight, track: Track) -> None:
     looked = View(plane, math.atan2(aside, across), elevation=min(max(rise, ELEVATION), STEEPEST))
     draw_ground(axes, looked, track)
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
-    for stretch in geometry.stretches(flight, track):
-        rows = slice(stretch.first, stretch.last + 1)
-        if stretch.pulse is None:
-            draw_line(axes, looked, track.axis[rows], MOTION, thin)
-        elif np.any(
-            np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE
-        ):  # an impulse does not move it
-            draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
+    for rows, pulse in geometry.stretches(flight, track):
+        colour, width = (MOTION, thin) if pulse is None else (PULSE, 1.8 * thin)
+        draw_line(axes, looked, track.axis[rows], colour, width)
     style.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
     (start,), _ = looked.seen(track.axis[0])
     axes.plot(*start, "o", color=MOTION, markersize=4.5)
     labels = [("t = 0", start)]
     for cone, direction in cones:
-        labels += _draw_keep(axes, looked, cone, direction)
+        (place,), (height,) = looked.seen(direction)
+        axes.plot(*place, "o", color=INK, markersize=7, markerfacecolor="none", zorder=4)
+        axes.plot(*place, ".", color=INK, markersize=3, zorder=4)  # as astronomers mark the Sun
+        labels.append((f"{cone.name} (behind)" if height < 0.0 else cone.name, place))
+        square = attitude.square_to(direction)
+        for sign, angle in (("≥", cone.least), ("≤", cone.most)):
+            if 0.0 < angle < math.pi:
+                edge = math.cos(angle) * direction + math.sin(angle) * square
+                rim = geometry.around(direction, edge)
+                draw_line(axes, looked, rim, GREY, 1.0)
+                places, heights = looked.seen(rim)
+                front = places[heights >= min(0.0, heights.max())]
+                lowest = front[np.argmin(front[:, 1])]
+                labels.append((f"{sign} {math.degrees(angle):.4g}° from {cone.name}", lowest))
     frame(axes, looked, track.axis)
     for name, place in labels:
         style.add(axes, name, place, INK, role="vital")
     axes.set_title("Spin axis on the globe\nrings 30°, 60°, 90° from H(0)")
-
-
-def _draw_keep(
-    axes: Axes, looked: View, cone: Keep, direction: Vector
-) -> Iterator[tuple[str, Vector]]:
-    """The ``direction`` of a cone, and the circles between which the spin axis is to stay.
-
-    Yields the label of each, and its place (2,).
-    """
-    (place,), (height,) = looked.seen(direction)
-    axes.plot(*place, "o", color=INK, markersize=7, markerfacecolor="none", zorder=4)
-    axes.plot(*place, ".", color=INK, markersize=3, zorder=4)  # as astronomers mark the Sun
-    yield (f"{cone.name} (behind)" if height < 0.0 else cone.name), place
-    square = attitude.square_to(direction)
-    bounds = [("≥", cone.least, cone.least > 0.0), ("≤", cone.most, cone.most < math.pi)]
-    for sign, angle, bounded in bounds:
-        if not bounded:
-            continue
-        rim = geometry.around(direction, math.cos(angle) * direction + math.sin(angle) * square)
-        draw_line(axes, looked, rim, GREY, 1.0)
-        places, heights = looked.seen(rim)
-        front = places if heights.max() < 0.0 else places[heights >= 0.0]
-        yield f"{sign} {math.degrees(angle):.4g}° from {cone.name}", front[np.argmin(front[:, 1])]
 
 
 def draw_ground(axes: Axes, looked: View, track: Track) -> None:
@@ -169,10 +152,8 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
         for height in (0.0, 0.5, math.sqrt(0.75)):
             ring = np.insert(math.sqrt(1.0 - height * height) * circle, 2, height, axis=1)
             draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
-    momentum, _ = looked.seen(
-        track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True)
-    )
-    axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
+    size = np.linalg.norm(track.momentum, axis=1, keepdims=True)
+    axes.plot(*looked.seen(track.momentum / size)[0].T, **style.PATH_OF_H)
 
 
 def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:

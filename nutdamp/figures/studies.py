@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
+from itertools import cycle
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,10 @@ from nutdamp.flight.propagation import model_name
 from nutdamp.montecarlo.statistics import VECTORS, Distribution
 from nutdamp.montecarlo.study import EARLY, Results
 from nutdamp.physics import attitude
-from nutdamp.planning.tradeoff import Front, Trade, numbered
+from nutdamp.planning.tradeoff import Trade, numbered
 from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.text import cost as written
 from nutdamp.views.text import text
@@ -37,29 +37,24 @@ if TYPE_CHECKING:
     from nutdamp.planning.screening import Dispersion
 
 
-TAIL, KNEE = (
-    2.0,
-    0.999,
-)  # the axis is logarithmic where the largest value is more than TAIL times the quantile KNEE
+# the axis is logarithmic where the largest value is more than TAIL times the quantile KNEE
+TAIL, KNEE = 2.0, 0.999
 DECADES = 6.0  # largest number of decades of that axis
 STEPS = 400  # steps of the curve of the cases within a value, besides the last ones
 ALIKE = 1e-9  # relative difference up to which the values of all cases are one, but for rounding
+NOTHING = 1e-6  # degrees below which all cases together are not worth a picture
 
-NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
-"""Degrees below which all cases together are not worth a picture, and their text."""
-
+# A requirement is drawn where it is at most so many times the largest value: beyond, it would
+# leave a panel empty.
 FAR = 4.0
-"""A requirement is drawn where it is at most so many times the largest value: beyond, it would
-leave a panel empty.
-"""
 
 DOTS = 2_000  # largest number of cases shown as dots: more would only make the picture heavy
 DENSE = 0.8  # opacity of a dot: fainter ones are not seen
 
 TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}  # look of the title of a panel
 
+# panels of each figure: nutation and momentum, their cases, and the final directions of H
 PANELS = {"overview": 3, "cases": 2, "momentum": 1}
-"""Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
 def dispersion_figure(flown: Dispersion, name: str = "overview", *, narrow: bool = False) -> Figure:
@@ -87,53 +82,43 @@ def _figure(
     figure = style.sheet(width, 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
-        _cases(axes[:2], results, judged)
+        for panel, part in zip(axes, (Part.NUTATION, requirements.aim(spacecraft)), strict=False):
+            _cases(panel, results, judged, part)
     if isinstance(results, Results) and name != "cases":
         _momentum(axes[-1], results)
-    style.legend(figure, axes, 2 if name == "momentum" else 8)
-    return style.finished(
-        figure, spacecraft, f"{how}, {results.done:,} dispersed cases", stated(judged)
-    )
+    style.legend(figure, axes)
+    about = f"{how}, {results.done:,} dispersed cases"
+    return style.finished(figure, spacecraft, about, stated(judged))
 
 
-def _cases(panels: list[Axes], results: Results | LoopResults, judged: Verdict) -> None:
-    """Share of the cases within each value of nutation and momentum shift."""
-    spacecraft = results.study.model.spacecraft
-    lines = {line.bound.part: line for line in judged.required}
-    for axes, part in zip(panels, (Part.NUTATION, requirements.aim(spacecraft)), strict=True):
-        distribution = results.distribution(part.value)
-        limit = style.limit_of(spacecraft, part)
-        nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
-        name = nutation if part is Part.NUTATION else part.label
-        required = "" if limit is None else f", required {style.number(limit)}°"
+def _cases(axes: Axes, results: Results | LoopResults, judged: Verdict, part: Part) -> None:
+    """Share of the cases within each value of nutation or momentum shift; words where a curve would
+    show nothing.
+    """
+    distribution = results.distribution(part.value)
+    limit = style.limit_of(results.study.model.spacecraft, part)
+    nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
+    name = nutation if part is Part.NUTATION else part.label
+    required = "" if limit is None else f", required {style.number(limit)}°"
+    least = most = 0.0
+    if distribution is not None:
+        least, most = math.degrees(distribution.minimum), math.degrees(distribution.maximum)
+    if distribution is None or most < NOTHING or most - least <= ALIKE * most:
+        said = "no case ends" if distribution is None else style.angle(distribution.maximum)
         axes.set_title(name, **TITLE)
-        alike = "no case ends" if distribution is None else _alike(distribution)
-        if distribution is None or alike is not None:
-            style.words(axes, f"all {results.done:,} cases:\n{alike}{required}")
-            continue
-        reached = math.degrees(float(distribution.quantiles(np.array([results.probability]))[0]))
-        share = exact_percent(results.probability)
-        shown = (
-            limit
-            if limit is not None and limit <= FAR * math.degrees(distribution.maximum)
-            else None
-        )
-        draw_distribution(axes, distribution, f"{name}, °", shown)
-        if limit is not None and shown is None:
-            style.off_scale(axes, f"required ≤ {style.number(limit)}°")
-        axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
-        axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
-        missed = part in lines and not lines[part].met
-        text = f"{name}\n{share} within {style.number(reached)}°{required}"
-        axes.set_title(text, color=MISSED if missed else INK, **TITLE)
-
-
-def _alike(distribution: Distribution) -> str | None:
-    """Text for cases of which a curve would show nothing; None where it shows something."""
-    least, most = math.degrees(distribution.minimum), math.degrees(distribution.maximum)
-    if most < NOTHING:
-        return f"below {NEXT_TO_NOTHING}"
-    return f"{style.number(most)}°" if most - least <= ALIKE * most else None
+        style.words(axes, f"all {results.done:,} cases:\n{said}{required}")
+        return
+    reached = math.degrees(float(distribution.quantiles(np.array([results.probability]))[0]))
+    share = exact_percent(results.probability)
+    near = limit is not None and limit <= FAR * most
+    draw_distribution(axes, distribution, f"{name}, °", limit if near else None)
+    if limit is not None and not near:
+        style.off_scale(axes, f"required ≤ {style.number(limit)}°")
+    axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
+    axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
+    missed = any(line.bound.part is part and not line.met for line in judged.required)
+    text = f"{name}\n{share} within {style.number(reached)}°{required}"
+    axes.set_title(text, color=MISSED if missed else INK, **TITLE)
 
 
 def draw_distribution(
@@ -204,30 +189,27 @@ def _momentum(axes: Axes, results: Results) -> None:
     from matplotlib.path import Path
 
     spacecraft = results.study.model.spacecraft
-    aim = requirements.aim(spacecraft)
+    shift = requirements.aim(spacecraft) is Part.SHIFT
     points = momentum_cases(results)
-    limit = style.limit_of(spacecraft, aim)
+    limit = style.limit_of(spacecraft, requirements.aim(spacecraft))
     # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the
     # centre in each.
-    centre, about = (
-        ("H(0)", "the H(0) of each case") if aim is Part.SHIFT else ("the target", "the target")
-    )
+    centre, about = ("H(0)", "the H(0) of each case") if shift else ("the target", "the target")
     x, y, sense = geometry.sky_names(results.study.nominal, centre)
     widest = float(np.hypot(*points.T).max())
     if widest < NOTHING:
         axes.set_title(f"Where H ends, about {about}", **TITLE)
-        style.words(axes, f"all {results.done:,} cases:\nwithin {NEXT_TO_NOTHING} of {centre}")
+        said = f"{style.angle(math.radians(widest))} from {centre}"
+        style.words(axes, f"all {results.done:,} cases:\n{said}")
         return
     around = ellipse(points, results.probability)
     # One path for all dots, as short in a file as can be: strokes of next to no length with round
-    # caps.
+    # caps. Above the ellipse: where all cases lie on a line, it would hide them.
     few = points[:DOTS]
     short = np.array([1e-3 * float(np.ptp(few, axis=0).max()), 0.0])
-    dots = Path(
-        np.stack([few, few + short], axis=1).reshape(-1, 2), [Path.MOVETO, Path.LINETO] * len(few)
-    )
+    strokes = np.stack([few, few + short], axis=1).reshape(-1, 2)
+    dots = Path(strokes, [Path.MOVETO, Path.LINETO] * len(few))
     dots.should_simplify = False
-    # Above the ellipse: where all cases lie on a line, it would hide them.
     axes.add_patch(
         PathPatch(
             dots,
@@ -239,12 +221,9 @@ def _momentum(axes: Axes, results: Results) -> None:
             zorder=2.5,
         )
     )
-    some = (
-        f"{len(few):,} of the {results.done:,} cases"
-        if len(few) < results.done
-        else f"the {results.done:,} cases"
-    )
-    axes.plot([], [], ".", color=MOTION, alpha=DENSE, label=some)
+    some = f"{len(few):,} of " if len(few) < results.done else ""
+    label = f"{some}the {results.done:,} cases"
+    axes.plot([], [], ".", color=MOTION, alpha=DENSE, label=label)
     held = f"holds {exact_percent(results.probability)} of the cases"
     axes.plot(*around.T, color=MOMENTUM, linewidth=1.5, label=held)
     shown = [points, around]
@@ -255,14 +234,11 @@ def _momentum(axes: Axes, results: Results) -> None:
         style.off_scale(axes, f"required ≤ {style.number(limit)}°")
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
-        name = centre.removeprefix("the ")
-        if aim is Part.SHIFT:
-            axes.plot(0.0, 0.0, "+", color=INK, markersize=9, zorder=3, label=name)
-        else:
-            axes.plot(0.0, 0.0, label=name, **style.TARGET)
-    axes.locator_params(
-        nbins=4
-    )  # of shifts of thousandths of a degree more labels would run into each other
+        cross = {**style.TARGET, "marker": "+", "markersize": 9.0, "zorder": 3}
+        look = cross if shift else style.TARGET
+        axes.plot(0.0, 0.0, label=centre.removeprefix("the "), **look)
+    # Of shifts of thousandths of a degree more labels would run into each other.
+    axes.locator_params(nbins=4)
     axes.set(xlabel=x, ylabel=y)
     axes.set_title(f"Where H ends, about {about}\n{sense}", **TITLE)
 
@@ -289,12 +265,9 @@ def accepted(flight: Flight, judged: Verdict) -> dict[str, Vector]:
     }
 
 
-REACH, SPARE = 3.0, 1.25
-"""Largest and least end of an axis of the acceptance box over its limit: farther schemes are arrows
-at the edge, and a limit alone leaves room beside its label.
-"""
-
-SPOTS = 30.0  # places along an axis of the acceptance box whose points have one label
+# largest and least end of an axis of the acceptance box over its limit: farther schemes are arrows
+# at the edge, and a limit alone leaves room beside its label
+REACH, SPARE = 1.4, 1.25
 
 OTHERS = (TURNED, INK, FIRED, GREY)  # colours of the schemes that are not recommended, in turn
 
@@ -317,42 +290,32 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
     """
     bounds = box_bounds(judged)
     limits = np.array([_in_units(bound, bound.limit) for bound in bounds])
-    regions = [(judged, MOTION, acceptance_contour(judged, bounds))]
-    regions += [
-        (verdict, colour, acceptance_contour(verdict, bounds))
-        for verdict, colour in zip(others, itertools.cycle(OTHERS), strict=False)
-    ]
-    tops = np.array([region.max(axis=0) for _, _, region in regions])
-    within = [np.all(region.min(axis=0) <= REACH * limits) for _, _, region in regions]
+    verdicts = [judged, *others]
+    regions = [acceptance_contour(verdict, bounds) for verdict in verdicts]
+    tops = np.array([region.max(axis=0) for region in regions])
+    within = [np.all(region.min(axis=0) <= REACH * limits) for region in regions]
     farthest = np.max(tops[within], axis=0, initial=0.0)
     bounded = np.isfinite(limits)
     near = np.clip(1.1 * farthest, SPARE * limits, REACH * limits)
     ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), geometry.LEAST)
-    corner = np.where(bounded, limits, 2.0 * ends)
-    axes.fill_between([0.0, corner[0]], corner[1], **style.BAND)
-    axes.plot(
-        [corner[0], corner[0], 0.0],
-        [0.0, corner[1], corner[1]],
-        **{**style.LIMIT, "label": None},
-    )
-    labels: dict[tuple[float, ...], list[tuple[str, str]]] = {}
-    for verdict, colour, region in reversed(regions):
-        recommended = verdict is judged
-        solid = "-" if verdict.met is not False else (0, (4, 1.5))
-        name = _contender(verdict)
+    right, top = np.where(bounded, limits, 2.0 * ends)
+    axes.fill_between([0.0, right], top, **style.BAND)
+    axes.plot([right, right, 0.0], [0.0, top, top], **{**style.LIMIT, "label": None})
+    colours = (MOTION, *(colour for _, colour in zip(others, cycle(OTHERS), strict=False)))
+    for order, (verdict, region, colour) in enumerate(zip(verdicts, regions, colours, strict=True)):
+        above = 3.0 - 0.01 * order  # the recommended one is on top
+        share = "" if verdict.cases is None else f", {share_text(verdict.cases)}"
+        name = f"{verdict.scheme} {spent(verdict.schedule)}{share}"
         beyond = region.min(axis=0) > ends
+        place, mark, ink = region[-1], "o", colour
         if beyond.any():
             row = int(beyond[1])
             nominal = _nominal(verdict, bounds)
-            place = np.minimum(nominal, ends)
-            mark = "^" if beyond[1] else ">"
             unit = " rpm" if bounds[row].part is Part.SPIN else "°"
             name += f": {style.number(nominal[row])}{unit}"
-        else:
-            place = region[-1]
-            mark = "o"
+            place, mark = np.minimum(nominal, ends), ">^"[row]
         if beyond.any() or len(region) < 3:
-            ground = colour if recommended else "none"
+            ground = colour if verdict is judged else "none"
             axes.plot(
                 *place,
                 mark,
@@ -360,22 +323,18 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
                 markersize=7,
                 markerfacecolor=ground,
                 clip_on=False,
-                zorder=3,
+                zorder=above,
             )
-            spot = tuple((np.round(place / ends * SPOTS) / SPOTS * ends).tolist())
-            labels.setdefault(spot, []).append((name, colour))
         else:
-            if recommended:
+            if verdict is judged:
                 axes.fill(*region.T, color=colour, alpha=0.3, linewidth=0.0)
+                ink = INK  # on its own fill
+            line = "-" if verdict.met is not False else (0, (4, 1.5))
             outline = np.vstack([region, region[:1]])
-            axes.plot(*outline.T, color=colour, linestyle=solid, linewidth=1.5)
+            axes.plot(*outline.T, color=colour, linestyle=line, linewidth=1.5, zorder=above)
             far = region[np.argmax(np.minimum(region, 0.97 * ends) @ (1.0 / ends))]
-            written_in = INK if recommended else colour  # on its own fill
-            style.add(axes, name, np.minimum(far, 0.97 * ends), written_in, role="vital")
-    for spot, written_there in labels.items():
-        names, colours = zip(*reversed(written_there), strict=True)
-        colour = INK if len(names) > 1 else colours[0]
-        style.add(axes, "\n".join(names), np.array(spot), colour, role="vital")
+            place = np.minimum(far, 0.97 * ends)
+        style.add(axes, name, place, ink, role="vital")
     across, along = map(_bound_axis, bounds)
     axes.set(xlim=(0.0, ends[0]), ylim=(0.0, ends[1]), xlabel=across, ylabel=along)
     axes.locator_params(nbins=6)
@@ -429,12 +388,6 @@ def _nominal(verdict: Verdict, bounds: tuple[Bound, Bound]) -> Vector:
     return np.array([_in_units(*pair) for pair in zip(bounds, values, strict=True)])
 
 
-def _contender(verdict: Verdict) -> str:
-    """Scheme, cost and share of the cases that comply."""
-    share = "" if verdict.cases is None else f", {share_text(verdict.cases)}"
-    return f"{verdict.scheme} {spent(verdict.schedule)}{share}"
-
-
 def _in_units(bound: Bound, value: float) -> float:
     """A value of a bound's part in deg, of the spin in rpm."""
     return RPM * value if bound.part is Part.SPIN else math.degrees(value)
@@ -450,24 +403,11 @@ def _bound_axis(bound: Bound) -> str:
     return f"{name}, {unit} ({word} {stated_limit(bound).replace(' deg', '°')})"
 
 
-SAME_ENDS = (0.02, 0.002)  # relative differences in end and in cost of points that are drawn as one
 WIDTH = 14.0  # characters of a line above the picture in an inch of it
 
-
-REACH = 1.4
-"""End of the axis of time over the last end of a schedule: to there its cost holds, as far as the
-horizon reaches.
-"""
-
-CHOSEN: dict[str, Any] = {
-    "color": INK,
-    "markersize": 11,
-    "markerfacecolor": "none",
-    "linestyle": "",
-    "clip_on": False,
-    "zorder": 4,
-}
-"""Look of the mark of the recommended plan."""
+# end of the axis of time over the last end of a schedule: to there its cost holds, as far as the
+# horizon reaches
+LATER = 1.4
 
 
 @style.styled()
@@ -492,65 +432,26 @@ def trade_figure(traded: Trade, *, narrow: bool = False) -> Figure:
         return style.finished(figure, spacecraft, about)
     axes = figure.subplots()
     axes.set_title(reasons, loc="left", **style.NOTE)
-    # A firing of no width at t = 0 ends there, which a log axis has no place for.
     ends = [point.plan.pulses.end for point in points]
-    ends += [chosen.pulses.end] if chosen is not None and len(chosen.pulses) else []
+    if chosen is not None and len(chosen.pulses):
+        ends.append(chosen.pulses.end)
+    # A firing of no width at t = 0 ends there, which a log axis has no place for.
     log = min(ends) > 0.0
     axes.set_xscale("log" if log else "linear")
     unit = points[0].unit
-    proved = [point.bounds.rigorous for point in points]
-    bounds = [bound for bound in proved if bound is not None]
+    bounds = [point.bounds.rigorous for point in points if point.bounds.rigorous is not None]
     proven = len(bounds) == len(points)
     # Below it for certain: the bound is rounded down as on the screen.
     base = down(min(bounds)) if proven else min(point.cost for point in points)
-    reach = max(min(REACH * max(ends), spacecraft.horizon), 1.03 * max(ends))
-    _draw_fronts(axes, spacecraft, fronts, base, reach)
-    if chosen is not None and len(chosen.pulses):
-        place = chosen.pulses.end, over(chosen.pulses.cost_in(unit), base)
-        ideal = ", ideal impulses" if chosen.pulses.idealised else ""
-        other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
-        axes.plot(*place, "D", label=f"recommended: {chosen.scheme}{other}", **CHOSEN)
-    axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)
-    axes.margins(y=0.12)
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if axes.dataLim.y0 < 0.0 else 0.0)
-    name = "propellant" if unit == "kg" else "impulse"
-    least = "the lower bound" if proven else "the cheapest point"
-    axes.set(xlabel="end of the last firing, s")
-    axes.set_ylabel(f"{name} over {least}, {written(base, unit)}, %")
-    if log:
-        style.log_axis(axes.xaxis)
-    axes.grid(True, which="both")
-    style.legend(figure, [axes], 3)
-    return style.finished(figure, spacecraft, about)
-
-
-def over(cost: float, base: float) -> float:
-    """A cost as % over the ``base``."""
-    return 100.0 * (cost / base - 1.0)
-
-
-def _draw_fronts(
-    axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], base: float, reach: float
-) -> None:
-    """Step lines to ``reach`` s, with their names, and numbered marks; a schedule of two fronts has
-    one mark.
-    """
-    shown: list[tuple[float, float, list[int]]] = []
-    points = [
-        (index, owner, point.plan.pulses.end, over(point.cost, base))
-        for index, owner, point in numbered(fronts)
-    ]
-    for front, (colour, mark, line) in zip(fronts, itertools.cycle(style.LOOKS), strict=False):
-        if not front.points:
-            continue
-        own = [(index, end, cost) for index, owner, end, cost in points if owner is front]
-        ends, costs = [end for _, end, _ in own], [cost for _, _, cost in own]
-        name = front_name(front, pointing=spacecraft.goal.axis is not None).replace(" deg", "°")
-        # A schedule serves for every later end, until a cheaper one does.
-        times, levels = np.repeat([*ends, reach], 2)[1:], np.repeat([*costs, costs[-1]], 2)[:-1]
-        axes.plot(times, levels, color=colour, linestyle=line)
-        failing = [fails(point) for point in front.points]
-        for end, cost, hollow in zip(ends, costs, failing, strict=True):
+    reach = max(min(LATER * max(ends), spacecraft.horizon), 1.03 * max(ends))
+    for front, (colour, mark, line) in zip(fronts, cycle(style.LOOKS), strict=False):
+        own = [
+            (number, point.plan.pulses.end, over(point.cost, base), fails(point))
+            for number, owner, point in numbered(fronts)
+            if owner is front
+        ]
+        look: dict[str, Any] = {"color": colour, "linestyle": line}
+        for number, end, cost, hollow in own:
             ground = PAPER if hollow else colour
             axes.plot(
                 end,
@@ -562,18 +463,44 @@ def _draw_fronts(
                 clip_on=False,
                 zorder=3.5,
             )
-        axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
-        for index, end, cost in own:
-            near = (place for place in shown if math.isclose(end, place[0], rel_tol=SAME_ENDS[0]))
-            same = next(
-                (place for place in near if math.isclose(cost, place[1], rel_tol=SAME_ENDS[1])),
-                None,
-            )
-            if same is None:
-                shown.append((end, cost, [index]))
-            else:
-                same[2].append(index)
-    if any(fails(point) for _, _, point in numbered(fronts)):
+            style.add(axes, str(number), np.array([end, cost]), INK)
+        if own:
+            # A schedule serves for every later end, until a cheaper one does.
+            times = [*(end for _, end, _, _ in own), reach]
+            costs = [*(cost for _, _, cost, _ in own), own[-1][2]]
+            axes.plot(np.repeat(times, 2)[1:], np.repeat(costs, 2)[:-1], **look)
+            name = front_name(front, pointing=spacecraft.goal.axis is not None)
+            axes.plot([], [], marker=mark, markersize=5, label=name.replace(" deg", "°"), **look)
+    if any(map(fails, points)):
         axes.plot([], [], "o", color=GREY, markerfacecolor=PAPER, label=f"hollow: {FAILS}")
-    for end, cost, numbers in shown:
-        style.add(axes, ", ".join(map(str, numbers)), np.array([end, cost]), INK)
+    if chosen is not None and len(chosen.pulses):
+        ideal = ", ideal impulses" if chosen.pulses.idealised else ""
+        other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
+        axes.plot(
+            chosen.pulses.end,
+            over(chosen.pulses.cost_in(unit), base),
+            "D",
+            label=f"recommended: {chosen.scheme}{other}",
+            color=INK,
+            markersize=11,
+            markerfacecolor="none",
+            clip_on=False,
+            zorder=4,
+        )
+    axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)
+    axes.margins(y=0.12)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if axes.dataLim.y0 < 0.0 else 0.0)
+    what = "propellant" if unit == "kg" else "impulse"
+    least = "the lower bound" if proven else "the cheapest point"
+    axes.set_xlabel("end of the last firing, s")
+    axes.set_ylabel(f"{what} over {least}, {written(base, unit)}, %")
+    if log:
+        style.log_axis(axes.xaxis)
+    axes.grid(True, which="both")
+    style.legend(figure, [axes])
+    return style.finished(figure, spacecraft, about)
+
+
+def over(cost: float, base: float) -> float:
+    """A cost as % over the ``base``."""
+    return 100.0 * (cost / base - 1.0)

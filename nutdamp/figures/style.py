@@ -29,25 +29,24 @@ if TYPE_CHECKING:
 
 # Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too,
 # for grey print.
+# Spin axis, body cone and other motion of the spacecraft; firings; angular momentum and space
+# cone.
 MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
-"""Spin axis, body cone and other motion of the spacecraft; firings; angular momentum and space
-cone.
-"""
 
+# Words about firings and about H: dark enough to be read on white (5.3:1, WCAG 2.1 requires
+# 4.5:1).
 FIRED, TURNED = "#B34700", "#007a58"
-"""Words about firings and about H: dark enough to be read on white (5.3:1, WCAG 2.1 requires
-4.5:1).
-"""
 
+# A verdict that says not to fly, and nothing else; one by nominal values alone.
 MISSED, UNCHECKED = "#b00020", "#8a5a00"
-"""A verdict that says not to fly, and nothing else; one by nominal values alone."""
 
+# Text and second curves; limits and axes; the circles of the sphere.
 INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
-"""Text and second curves; limits and axes; the circles of the sphere."""
 
+# Colours of the title of a picture by its verdict.
 LIGHTS = {Light.GREEN: INK, Light.AMBER: UNCHECKED, Light.RED: MISSED}
-"""Colours of the title of a picture by its verdict."""
 
+# Mark of the target axis: larger than the marks of ends of paths there, and over them.
 TARGET: dict[str, Any] = {
     "marker": "*",
     "color": INK,
@@ -56,7 +55,6 @@ TARGET: dict[str, Any] = {
     "linestyle": "",
     "zorder": 4,
 }
-"""Mark of the target axis: larger than the marks of ends of paths there, and over them."""
 
 PATH_OF_H: dict[str, Any] = {
     "color": MOMENTUM,
@@ -64,6 +62,7 @@ PATH_OF_H: dict[str, Any] = {
     "linestyle": (0, (3, 1.5)),
 }  # look of the path of H
 
+# Look of a bound of the requirement.
 LIMIT: dict[str, Any] = {
     "color": GREY,
     "linewidth": 1.3,
@@ -71,13 +70,12 @@ LIMIT: dict[str, Any] = {
     "label": "required",
     "zorder": 1.5,
 }
-"""Look of a bound of the requirement."""
 
+# Look of what keeps a bound, and of a dead band.
 BAND: dict[str, Any] = {"facecolor": GREY, "alpha": 0.16, "linewidth": 0.0}
-"""Look of what keeps a bound, and of a dead band."""
 
+# Ground under a hollow mark; in a page, its background.
 PAPER = "#fefefe"
-"""Ground under a hollow mark; in a page, its background."""
 
 LINE, THIN = 1.3, 0.7  # line widths, points
 SMALL, TICK_SIZE = 7.5, 8  # sizes of labels inside a panel and of those of its ticks, points
@@ -146,6 +144,7 @@ def styled() -> Iterator[None]:
         yield
 
 
+# Fonts that draw what `DejaVu Sans` does not, where they are installed.
 OTHER_SCRIPTS = (
     "Noto Sans CJK JP",
     "WenQuanYi Zen Hei",
@@ -154,7 +153,6 @@ OTHER_SCRIPTS = (
     "Arial Unicode MS",
     "MS Gothic",
 )
-"""Fonts that draw what `DejaVu Sans` does not, where they are installed."""
 
 
 def legible(figure: Figure) -> None:
@@ -251,21 +249,17 @@ def thinned(count: int, most: int = 24) -> list[int]:
 
 
 def log_axis(axis: Axis) -> None:
-    """Plain numbers at the decades of a log axis whose limits are set; where these are fewer than
-    two, at 1, 2 and 5 of each, or evenly within part of one.
+    """Plain numbers on a log axis whose limits are set: at the decades, over fewer than two of them
+    at 1, 2 and 5 of each, and evenly within one.
     """
     from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
     low, high = sorted(axis.get_view_interval())
-    for subs in ((1.0,), (1.0, 2.0, 5.0)):
-        locator = LogLocator(subs=subs)
-        within = (low <= tick <= high for tick in locator.tick_values(low, high))
-        if sum(within) > 1:
-            axis.set_major_locator(locator)
-            break
-    else:
+    if high < 10.0 * low:
         axis.set_major_locator(MaxNLocator(5))
         axis.set_minor_locator(NullLocator())
+    elif high < 100.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter("")
 
@@ -306,12 +300,12 @@ def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
 
 
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5, 1, 1.5)), (0, (5, 1.5)), ":")
+# Colour, mark and line of curves of one kind, in turn: those beside each other differ in all.
 LOOKS = tuple(
     (colour, mark, _DASHES[(row + turn) % len(_DASHES)])
     for turn in range(3)
     for row, (colour, mark) in enumerate(((MOTION, "o"), (MOMENTUM, "^"), (INK, "s"), (GREY, "v")))
 )
-"""Colour, mark and line of curves of one kind, in turn: those beside each other differ in all."""
 
 LETTERS = 11.0  # bold letters of a heading that fit in an inch
 LONGEST_NAME = 40  # characters of a name that fit above a picture
@@ -341,7 +335,13 @@ def short(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
 
 
-def legend(figure: Figure, axes: Iterable[Axes], columns: int = 8) -> None:
+DOT = 4.0  # points that a mark of a legend measures at least, where a curve has smaller ones
+LETTER = 4.6  # points that a letter of a legend takes, about
+# points to the left of the text in a legend, its line or mark, and between columns
+HANDLE, GAP = 25.0, 11.0
+
+
+def legend(figure: Figure, axes: Iterable[Axes]) -> None:
     """One legend under all panels, each name once, where no curve can run into it, in as many
     columns as fit.
     """
@@ -350,30 +350,19 @@ def legend(figure: Figure, axes: Iterable[Axes], columns: int = 8) -> None:
         for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
             handles.setdefault(name, handle)
     if handles:
-        room, across = (
-            72.0 * figure.get_figwidth() + GAP,
-            HANDLE + LETTER * max(map(len, handles)) + GAP,
-        )
-        many = min(columns, len(handles), max(int(room / across), 1))
+        across = HANDLE + LETTER * max(map(len, handles)) + GAP
+        fit = int((72.0 * figure.get_figwidth() + GAP) / across)
         drawn = figure.legend(
             list(handles.values()),
             list(handles),
             loc="outside lower center",
-            ncols=many,
+            ncols=max(min(fit, len(handles)), 1),
             handlelength=2.2,
             borderpad=0.2,
             columnspacing=1.4,
         )
         for mark in drawn.get_lines():
             mark.set_markersize(max(mark.get_markersize(), DOT))
-
-
-DOT = 4.0  # points that a mark of a legend measures at least, where a curve has smaller ones
-LETTER = 4.6  # points that a letter of a legend takes, about
-HANDLE, GAP = (
-    25.0,
-    11.0,
-)  # points to the left of the text in a legend, its line or mark, and between columns
 
 
 def add(axes: Axes, text: str, place: Vector, colour: str, *, role: str = "label") -> None:
@@ -398,31 +387,31 @@ def target(axes: Axes, places: Vector, name: str = "target") -> None:
         add(axes, "target", places[0], INK, role="vital")
 
 
+# offsets from a point to the nearest corner of its label, points
 QUADRANTS = [
     (x * away, y * away)
     for away in (3.5, 7.0, 12.0, 24.0, 36.0)
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))
 ]
-"""Offsets from a point to the nearest corner of its label, points."""
 
-ABOVE = [(0.0, 2.0), (0.1, 2.0), (-0.1, 2.0)]
-"""Offsets of the label of a bar: its middle,
-its begin or its end is above the middle of the bar.
-"""
+# Offsets by role, in the order in which labels are laid: numbers stay near their points, and the
+# middle, the begin or the end of the label of a bar is above the middle of the bar.
+OFFSETS = {
+    "_vital": QUADRANTS,
+    "_label": QUADRANTS[:8],
+    "_bar": [(0.0, 2.0), (0.1, 2.0), (-0.1, 2.0)],
+}
 
-OFFSETS = {"_vital": QUADRANTS, "_label": QUADRANTS[:8], "_bar": ABOVE}
-"""Offsets of labels by their role, in the order in which they are laid: numbers stay near their
-points.
-"""
-
+SAME = 5.0  # points within which labels have one place: less than the height of a letter
+LISTED = 3  # largest number of labels of one place that are listed; of more the first and the last
 PASSES = 3  # passes of the layout before the last one: panels of equal scales need them
+# cost of a place on another label or outside the panel, and on a mark; on a line it is 1
 NO_ROOM, ON_MARK = 1000.0, 10.0
-"""Cost of a place on another label or outside the panel, and on a mark; on a line it is 1."""
 
 
 def settle(figure: Figure) -> None:
-    """Lay out the panels, and each label where it covers least; take out those for which there is
-    no room.
+    """Lay out the panels, and each label where it covers least; labels of one place become one, and
+    those for which there is no room are taken out.
     """
     for axes in figure.axes:
         # Drawn later outside this style, as many ticks fit between labels of the same size.
@@ -436,14 +425,26 @@ def settle(figure: Figure) -> None:
     figure.draw_without_rendering()
     figure.set_layout_engine(None)  # labels are put where panels are now
     for axes in figure.axes:
-        notes: list[Any] = [
-            note for role in OFFSETS for note in axes.texts if note.get_label() == role
-        ]
-        bars = [note for note in notes if note.get_label() == "_bar"]
-        if notes and not _lay(axes, notes) and bars:
+        notes: dict[tuple[str, ...], list[Any]] = {}
+        for role in OFFSETS:
+            for note in (text for text in axes.texts if text.get_label() == role):
+                place = axes.transData.transform(note.xy) * 72.0 / figure.dpi  # type: ignore[attr-defined]
+                notes.setdefault((role, *map(str, np.round(place / SAME))), []).append(note)
+        for (role, *_), (first, *others) in notes.items():
+            texts = [note.get_text() for note in (first, *others)]
+            if role == "_label" and len(texts) > LISTED:
+                texts = [f"{texts[0]} … {texts[-1]}"]
+            first.set_text(("\n" if role == "_vital" else ", ").join(texts))
+            for note in others:
+                if note.get_color() != first.get_color():
+                    first.set_color(INK)
+                note.remove()
+        laid = [first for first, *_ in notes.values()]
+        bars = [note for note in laid if note.get_label() == "_bar"]
+        if laid and not _lay(axes, laid) and bars:
             for note in bars:
                 note.set_text(note.get_text().partition(":")[0])
-            _lay(axes, notes)
+            _lay(axes, laid)
 
 
 def _lay(axes: Axes, notes: Sequence[Annotation]) -> bool:

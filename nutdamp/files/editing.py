@@ -26,8 +26,9 @@ import numpy as np
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile, SenselessOption, cure_of
 from nutdamp.files.yaml import MAX_DEPTH, KeyPath, Node, Place, dotted, read_tree, read_value
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, frames
 from nutdamp.physics import body as rigid_body
+from nutdamp.spacecraft import directions
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.units import FASTEST, KINDS, Angles, Bare, angles, parse, reading, shown, word
 
@@ -272,7 +273,7 @@ def aimed(
             problem = "needs the key sun of the file: [right ascension, declination], or sun: epoch"
         if problem:
             raise SenselessOption("sun_angle", shown(sun_angle), problem)
-        axis = spacecraft.at_sun_angle(sun_angle)
+        axis = directions.at_sun_angle(spacecraft, sun_angle)
         goal = replace(goal, axis=axis, sun_angle=float(sun_angle))
     if sun is not None:
         goal = replace(goal, sun=_direction(spacecraft, "sun", sun, doubt))
@@ -302,7 +303,7 @@ def _direction(
     if abs(pair.second) <= 0.5 * math.pi if in_sky else 0.0 <= pair.first < math.pi:
         for text in pair.readings:
             doubt(f"{name}: {text}")
-        return attitude.on_sphere(*pair) if in_sky else spacecraft.direction_in_n(*pair)
+        return frames.on_sphere(*pair) if in_sky else directions.direction_in_n(spacecraft, *pair)
     problem = "expected a declination of -90 deg to 90 deg"
     if not in_sky:
         problem = "expected a tilt of at least 0 and below 180 deg"
@@ -319,48 +320,39 @@ def _argument(
         raise SenselessOption(name, shown(value), str(wrong)) from None
 
 
-def edited(
-    text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] | None = None
-) -> str:
-    """The text with ``values``, each a flow value by its path, and keys of the first level
-    ``renamed``.
+def edited(text: str, values: Mapping[KeyPath, str]) -> str:
+    """The text with ``values``, each a flow value by its path.
 
     A key that is not there is added, at the end of the mapping it belongs to, which must be there
     but for the first level. Raises BadRequest for an alias, and for what has one: a change would
     show in the other place too.
     """
     for path, value in values.items():
-        text = _with(text, path, value)
-    for old, new in (renamed or {}).items():
-        place = read_tree(text, "edited")[0].keys.get(old)
-        if place is not None:
-            begin = text[: place.offset]
-            text = begin + re.sub(rf"""^(['"]?){old}\1""", new, text[place.offset :])
-    return text
-
-
-def _with(text: str, path: KeyPath, value: str) -> str:
-    held = read_tree(text, "edited")[0]
-    indent = ""
-    for depth, step in enumerate(path):
-        node = held.get(step)
-        if node is None:
-            return _added(text, held, path[depth:], value)
-        where = dotted(path[: depth + 1])
-        key = held.keys.get(str(step))
-        if key is not None and node.place.offset < key.offset:
-            raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
-        anchor = re.match(r"&(\S+)", text[node.place.offset :])
-        if anchor and f"*{anchor[1]}" in text:
-            raise BadRequest(
-                f"{where} has the alias *{anchor[1]}: write that out, for it to be changed"
-            )
-        # The entries of a block may stand as far left as its key; a flow value may not.
+        held = read_tree(text, "edited")[0]
         indent = ""
-        if key is not None and node.place.line > key.line and node.place.column <= key.column:
-            indent = "  "
-        held = node
-    return text[: held.place.offset] + indent + value + text[held.end :]
+        for depth, step in enumerate(path):
+            node = held.get(step)
+            if node is None:
+                text = _added(text, held, path[depth:], value)
+                break
+            where = dotted(path[: depth + 1])
+            key = held.keys.get(str(step))
+            if key is not None and node.place.offset < key.offset:
+                raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
+            anchor = re.match(r"&(\S+)", text[node.place.offset :])
+            if anchor and f"*{anchor[1]}" in text:
+                raise BadRequest(
+                    f"{where} has the alias *{anchor[1]}: write that out, for it to be changed"
+                )
+            # The entries of a block may stand as far left as its key; a flow value may not.
+            left = (
+                key is not None and node.place.line > key.line and node.place.column <= key.column
+            )
+            indent = "  " * left
+            held = node
+        else:
+            text = text[: held.place.offset] + indent + value + text[held.end :]
+    return text
 
 
 def _added(text: str, parent: Node, path: KeyPath, value: str) -> str:
@@ -500,7 +492,7 @@ def attitude_edits(tree: Node, later: Later) -> Edits:
         places: dict[KeyPath, float] = {
             ("spin_axis", 0): attitude.full_turn(math.atan2(axis[1], axis[0])),
             ("spin_axis", 1): math.atan2(axis[2], math.hypot(axis[0], axis[1])),
-            ("phase",): attitude.phase_about(first, axis, attitude.ascending_node(axis)),
+            ("phase",): frames.phase_about(first, axis, frames.ascending_node(axis)),
         }
         ascension, declination, phase = (
             as_before(tree.get("attitude", *path), angle, "angle") for path, angle in places.items()
@@ -542,7 +534,11 @@ def carry_text(
         path: as_before(tree.get(*path), value, kind) if kind else flow(value)
         for path, value, kind in edits(tree)
     }
-    return edited(text, values, {"state": "omega0"} if ("state",) in values else {})
+    text = edited(text, values)
+    if ("state",) in values:  # rates, in place of spin and nutation
+        begin = read_tree(text, name)[0].keys["state"].offset
+        text = text[:begin] + re.sub(r"""^(['"]?)state\1""", "omega0", text[begin:])
+    return text
 
 
 def as_before(node: Node | None, value: float, kind: str) -> str:

@@ -28,7 +28,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
 from nutdamp.montecarlo.statistics import EXACT_CASES, Array
 from nutdamp.montecarlo.study import Results, Study
-from nutdamp.physics.attitude import PRECESSED
+from nutdamp.physics.frames import PRECESSED
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 

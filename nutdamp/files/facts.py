@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nutdamp.files.fields import SMALLEST, Finding, Values
 from nutdamp.files.keys import SPACECRAFT, thrust_behind
 from nutdamp.files.yaml import KeyPath, Node
-from nutdamp.physics import body as rigid_body
+from nutdamp.physics import inertia as principal_moments
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.spacecraft.schedule import STEERABLE
 
@@ -35,7 +35,7 @@ class Facts(Values):
     axis 3, rad/s; each None where it is not known, or impossible.
     """
 
-    principal: tuple[rigid_body.Moments, Vector] | None = None
+    principal: tuple[principal_moments.Moments, Vector] | None = None
     inertia: Inertia | None = None
     spin: float | None = None
 
@@ -59,7 +59,7 @@ class Facts(Values):
         if len(rows) == 3 and all(row is not None for row in rows):
             fault = tensor_fault(np.array(rows))
             if fault is None:
-                self.principal = rigid_body.principal_axes(symmetric(np.array(rows)))
+                self.principal = principal_moments.principal_axes(symmetric(np.array(rows)))
             if omega0 is not None:
                 spin_path = ("omega0",)
                 spin = None
@@ -87,7 +87,7 @@ class Facts(Values):
         if self.principal is None:
             return
         moments = self.principal[0]
-        stable = rigid_body.growth(moments, spin or 0.0, wheel).stable
+        stable = principal_moments.growth(moments, spin or 0.0, wheel).stable
         if rows and wheel and spin is not None and not stable:
             low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
             yield Finding(
@@ -99,7 +99,7 @@ class Facts(Values):
             "degenerate": "the same principal moment as just one other axis",
             "intermediate": "the middle principal moment",
         }
-        kind = rigid_body.axis_class(moments)
+        kind = principal_moments.axis_class(moments)
         if kind in unstable and not wheel:
             named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
             values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)

@@ -11,13 +11,13 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
+from itertools import chain, pairwise, repeat
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from nutdamp.errors import listed, nearest
-from nutdamp.files.yaml import KeyPath, Node
+from nutdamp.files.yaml import KeyPath, Node, read_value
 from nutdamp.units import KINDS, parse, pattern, shown
 
 REQUIRED: Any = ...
@@ -66,7 +66,8 @@ class ValueKind:
     """Kind of a value: how it is ``read``, its JSON ``schema``, the kinds of its ``parts``, and the
     ``form`` in which people write it.
 
-    A section has ``keys`` and the ``definition`` to which its schema refers.
+    A section has ``keys`` and a ``title``, by which schemas refer to it; ``extra`` are further
+    keywords of its own schema.
     """
 
     read: Read
@@ -74,7 +75,9 @@ class ValueKind:
     parts: tuple[ValueKind, ...] = ()
     form: str = ""
     keys: Mapping[str, Key] = field(default_factory=dict)
-    definition: Mapping[str, Any] = field(default_factory=dict)
+    title: str = ""
+    about: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
 
     def within(self) -> Iterator[ValueKind]:
         """This kind and all below it, but for those of the keys of a section."""
@@ -84,22 +87,14 @@ class ValueKind:
 
 
 class Key(NamedTuple):
-    """A key of a section: the kind of its value, its description, examples, and default."""
+    """A key of a section: the kind of its value, its description, examples as a file has them, and
+    default.
+    """
 
     kind: ValueKind
     description: str
-    examples: tuple[Any, ...]
-    default: Any = REQUIRED
-
-
-def required(kind: ValueKind, description: str, *examples: Any) -> Key:
-    """A key that must be there."""
-    return Key(kind, description, examples)
-
-
-def optional(kind: ValueKind, description: str, *examples: Any, default: Any = None) -> Key:
-    """A key that may be left out."""
-    return Key(kind, description, examples, default)
+    examples: tuple[str, ...] = ()
+    default: Any = None
 
 
 def mismatch(node: Node, expected: str) -> ValueError:
@@ -177,47 +172,47 @@ def choice(*words: str) -> ValueKind:
 
 def row(*parts: ValueKind) -> ValueKind:
     """A list of as many entries as there are kinds, each of its own."""
-
-    def read(node: Node, path: KeyPath, values: Values) -> list[Any]:
-        entries = _entries(node, len(parts), len(parts))
-        kinds = enumerate(zip(parts, entries, strict=True))
-        return [values.read(kind, entry, (*path, place)) for place, (kind, entry) in kinds]
-
     counts = {"minItems": len(parts), "maxItems": len(parts)}
     schema = {"type": "array", "prefixItems": [part.schema for part in parts], **counts}
-    return ValueKind(read, schema, parts)
+    return _list(parts, schema)
 
 
 def rows(part: ValueKind, minimum: int = 0, largest: int | None = None) -> ValueKind:
     """A list of entries of one kind, ``minimum`` to ``largest`` of them."""
-
-    def read(node: Node, path: KeyPath, values: Values) -> list[Any]:
-        entries = enumerate(_entries(node, minimum, largest))
-        return [values.read(part, entry, (*path, place)) for place, entry in entries]
-
     counts = {"minItems": minimum, "maxItems": largest}
     bounds = {name: count for name, count in counts.items() if count}
-    return ValueKind(read, {"type": "array", "items": part.schema, **bounds}, (part,))
+    return _list((part,), {"type": "array", "items": part.schema, **bounds})
 
 
-def _entries(node: Node, minimum: int, largest: int | None) -> list[Node]:
-    """The entries of a list of ``minimum`` to ``largest``; raises ValueError for another value."""
-    entries = node.value
-    if not isinstance(entries, list):
-        raise mismatch(node, A_LIST)
-    if not entries and minimum == 1:
-        raise ValueError("empty; expected an entry")
-    if len(entries) < minimum or len(entries) > (largest or math.inf):
-        expected = f"{minimum}" if minimum == largest else f"{minimum} to {largest}"
-        expected = f"at least {minimum}" if largest is None else expected
-        comma = ""
-        for one, other in pairwise(entry.value for entry in entries):
-            # a decimal comma makes two entries of one: [0,5 deg, 1 deg]
-            if type(one) is int and isinstance(other, str) and other[:1].isdigit():
-                comma = f"; '{one},{other}' has a decimal comma; write {one}.{other}"
-                break
-        raise ValueError(f"expected {expected} entries, got {len(entries)}{comma}")
-    return entries
+def _list(parts: tuple[ValueKind, ...], schema: dict[str, Any]) -> ValueKind:
+    """A list of entries of the kinds ``parts``, the last of which repeats, as many as the schema
+    says.
+    """
+    minimum, largest = schema.get("minItems", 0), schema.get("maxItems")
+
+    def read(node: Node, path: KeyPath, values: Values) -> list[Any]:
+        entries = node.value
+        if not isinstance(entries, list):
+            raise mismatch(node, A_LIST)
+        if not entries and minimum == 1:
+            raise ValueError("empty; expected an entry")
+        if len(entries) < minimum or len(entries) > (largest or math.inf):
+            expected = f"{minimum}" if minimum == largest else f"{minimum} to {largest}"
+            expected = f"at least {minimum}" if largest is None else expected
+            comma = ""
+            for one, other in pairwise(entry.value for entry in entries):
+                # a decimal comma makes two entries of one: [0,5 deg, 1 deg]
+                if type(one) is int and isinstance(other, str) and other[:1].isdigit():
+                    comma = f"; '{one},{other}' has a decimal comma; write {one}.{other}"
+                    break
+            raise ValueError(f"expected {expected} entries, got {len(entries)}{comma}")
+        kinds = chain(parts, repeat(parts[-1]))
+        return [
+            values.read(kind, entry, (*path, place))
+            for place, (kind, entry) in enumerate(zip(kinds, entries, strict=False))
+        ]
+
+    return ValueKind(read, schema, parts)
 
 
 def named(part: ValueKind, minimum: int = 0) -> ValueKind:
@@ -238,17 +233,34 @@ def named(part: ValueKind, minimum: int = 0) -> ValueKind:
     return ValueKind(read, schema | ({"minProperties": minimum} if minimum else {}), (part,))
 
 
-def either(several: ValueKind, section: ValueKind) -> ValueKind:
-    """A list in one form, or a mapping in another."""
+def chosen(
+    choose: Callable[[Node], ValueKind | None],
+    expected: str,
+    schema: Mapping[str, Any],
+    *parts: ValueKind,
+) -> ValueKind:
+    """A value of one of several kinds, as its form tells; of None what is ``expected`` is told."""
 
     def read(node: Node, path: KeyPath, values: Values) -> Any:
-        if not isinstance(node.value, list | dict):
-            raise mismatch(node, f"{A_LIST} or {A_MAPPING}")
-        meant = several if isinstance(node.value, list) else section
-        return meant.read(node, path, values)
+        kind = choose(node)
+        if kind is None:
+            raise mismatch(node, expected)
+        return kind.read(node, path, values)
 
+    return ValueKind(read, schema, parts)
+
+
+def turned(kind: ValueKind, turn: Callable[[Any], Any]) -> ValueKind:
+    """A kind that means what ``turn`` makes of the meaning of another."""
+    return replace(kind, read=lambda *place: turn(kind.read(*place)))
+
+
+def either(several: ValueKind, section: ValueKind) -> ValueKind:
+    """A list in one form, or a mapping in another."""
+    forms: Mapping[type, ValueKind] = {list: several, dict: section}
     schema = {"oneOf": [several.schema, section.schema]}
-    return ValueKind(read, schema, (several, section))
+    expected = f"{A_LIST} or {A_MAPPING}"
+    return chosen(lambda node: forms.get(type(node.value)), expected, schema, several, section)
 
 
 def section(
@@ -278,19 +290,24 @@ def section(
                 )
         return SimpleNamespace(**contents)
 
+    reference = {"$ref": f"#/$defs/{title}"}
+    return ValueKind(read, reference, keys=keys, title=title, about=about, extra=extra or {})
+
+
+def definition(section: ValueKind) -> dict[str, Any]:
+    """JSON Schema of a section, to which other schemas refer by its title."""
     properties = {}
-    for name, key in keys.items():
-        texts = {"description": key.description, "examples": [*key.examples]}
+    for name, key in section.keys.items():
+        examples = [read_value(text, name)[0].plain() for text in key.examples]
         default = {} if key.default in (None, REQUIRED) else {"default": key.default}
+        texts = {"description": key.description, "examples": examples}
         properties[name] = {**key.kind.schema, **texts, **default}
-    needed = [name for name, key in keys.items() if key.default is REQUIRED]
-    definition = {
-        **{"type": "object", "title": title, "description": about},
-        **{"properties": properties, "additionalProperties": False, **(extra or {})},
+    needed = [name for name, key in section.keys.items() if key.default is REQUIRED]
+    return {
+        **{"type": "object", "title": section.title, "description": section.about},
+        **{"properties": properties, "additionalProperties": False, **section.extra},
         **({"required": needed} if needed else {}),
     }
-    reference = {"$ref": f"#/$defs/{title}"}
-    return ValueKind(read, reference, keys=keys, definition=definition)
 
 
 def definitions(kind: ValueKind) -> dict[str, Any]:
@@ -299,8 +316,60 @@ def definitions(kind: ValueKind) -> dict[str, Any]:
     for key in kind.keys.values():
         for part in key.kind.within():
             if "$ref" in part.schema:
-                below |= {**definitions(part), part.definition["title"]: part.definition}
+                below |= {**definitions(part), part.title: definition(part)}
     return below
+
+
+_KEY = re.compile(r"(\w+)(!?)(?: = (.+?))?: (.+), e\.g\. (.+)\n((?: {4}.+\n)+)")
+_SIGNS = {">=": "minimum", ">": "exclusiveMinimum", "<=": "maximum", "<": "exclusiveMaximum"}
+
+
+def sections(
+    table: str, others: Mapping[str, ValueKind], extra: Mapping[str, Mapping[str, Any]]
+) -> dict[str, ValueKind]:
+    """The sections that a table of keys declares, by their names, and the ``others``.
+
+    They are apart by blank lines, each behind those that it refers to: its title, what it is, and
+    its keys, as ``key = default: kind, e.g. example or example``; ``key!`` is one that must be
+    there. The description of a key stands indented below it. ``extra``: see `section`.
+    """
+    kinds = dict(others)
+    for paragraph in re.sub(r"\n {8}", " ", table).split("\n\n"):
+        title, rest = f"{paragraph.strip()}\n".split("\n", maxsplit=1)
+        keys = {}
+        for key, needed, default, words, examples, description in _KEY.findall(rest):
+            kind = named_kind(words, kinds)
+            meaning = REQUIRED if needed else None
+            if default:
+                node = read_value(default, key)[0]
+                meaning = kind.read(node, (), Values(node))
+            text = " ".join(description.split())
+            keys[key] = Key(kind, text, tuple(examples.split(" or ")), meaning)
+        about = " ".join(_KEY.split(rest, maxsplit=1)[0].split())
+        kinds[title.removesuffix("Section")] = section(title, about, keys, extra.get(title))
+    return kinds
+
+
+def named_kind(words: str, others: Mapping[str, ValueKind]) -> ValueKind:
+    """The kind of value that ``words`` in a table of keys name.
+
+    They are a kind of quantity with its bounds (``time > 0``), so many of a kind (``3 of rate``,
+    ``list of name``), a list or a section (``times or Width``), words to choose from (``gyro |
+    accelerometer``), or one of the ``others``.
+    """
+    if words in others:
+        return others[words]
+    if " | " in words:
+        return choice(*words.split(" | "))
+    if " or " in words:
+        return either(*(named_kind(form, others) for form in words.split(" or ")))
+    count, _, part = words.partition(" of ")
+    if part:
+        size = None if count == "list" else int(count)
+        return rows(named_kind(part, others), size or 0, size)
+    what, *bounds = re.split(" (>=|>|<=|<) ", words)
+    limits = (int(limit) if limit.isdigit() else parse(limit, what) for limit in bounds[1::2])
+    return quantity(what, **dict(zip(map(_SIGNS.__getitem__, bounds[::2]), limits, strict=True)))
 
 
 def _put_right(node: Node, key: str, keys: Mapping[str, Key]) -> str:

@@ -23,11 +23,10 @@ import numpy as np
 from nutdamp import units
 from nutdamp.errors import Fault, FaultyFile, in_order, warn
 from nutdamp.files.facts import CANCELLED, Facts, Vector, force_vector
-from nutdamp.files.fields import Finding, definitions
+from nutdamp.files.fields import Finding, definition, definitions
 from nutdamp.files.keys import SPACECRAFT, dispersions, thrust_behind
 from nutdamp.files.rules import correlation_findings, doubts, findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
-from nutdamp.physics import attitude
 from nutdamp.spacecraft.equipment import (
     Channel,
     Commands,
@@ -129,10 +128,8 @@ def _contents(
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
     """The finding with its place; a missing key is reported at the key of its parent."""
     path = finding.path
-    if finding.at_key or root.get(*path) is None:
-        place = root.key_place_of(path if finding.at_key else path[:-1])
-    else:
-        place = root.place_of(path)
+    missing = not finding.at_key and root.get(*path) is None
+    place = root.place_of(path[:-1] if missing else path, key=finding.at_key or missing)
     return place.fault(name, dotted(path), finding.problem)
 
 
@@ -172,7 +169,9 @@ def read_spacecraft(
     steerable = _part(Steerable, contents.steerable)
     sunward = _sun(contents)
     if contents.attitude is not None and contents.attitude.sun_phase is not None:
-        axis = attitude.on_sphere(*(contents.attitude.spin_axis or ()))
+        from nutdamp.physics import frames  # directions in space
+
+        axis = frames.on_sphere(*(contents.attitude.spin_axis or ()))
         if sunward is None or np.linalg.norm(np.cross(axis, sunward)) < ALONG:
             finding = Finding(
                 ("attitude", "sun_phase"),
@@ -185,7 +184,8 @@ def read_spacecraft(
     required = contents.requirement
     bounds = ("nutation", "momentum_shift", "pointing", "spin")
     asks = any(getattr(required, bound, None) is not None for bound in bounds)
-    loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
+    loss, limits, orbit = contents.dissipation, contents.limits, contents.orbit
+    per_kg = contents.center_of_mass_per_kg
     spacecraft = Spacecraft(
         name=contents.name,
         inertia=inertia,
@@ -193,7 +193,7 @@ def read_spacecraft(
         mass=contents.mass,
         center_of_mass=None if contents.center_of_mass is None else center,
         center_of_mass_per_kg=axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None,
-        attitude=_given(contents.attitude, _attitude, inertia, omega0, sunward),
+        attitude=contents.attitude and _attitude(contents.attitude, inertia, omega0, sunward),
         channels=tuple(
             Channel(name, tuple(map(thrusters.__getitem__, members)))
             for name, members in channels.items()
@@ -209,17 +209,15 @@ def read_spacecraft(
         nutation_grows=None if loss is None or loss.nutation is None else loss.nutation == "grows",
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
-        orbit=_given(
-            contents.orbit,
-            lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper()),
-        ),
+        orbit=orbit
+        and Orbit(np.array(orbit.position), np.array(orbit.velocity), orbit.center.upper()),
         cold=cold,
         tank=tank,
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
-        sun_sensor=_given(contents.sun_sensor, _sun_sensor, axes),
-        commands=_given(contents.commands, _commands),
-        loop=_given(contents.loop, _loop, axes, center),
+        sun_sensor=contents.sun_sensor and _sun_sensor(contents.sun_sensor, axes),
+        commands=contents.commands and _commands(contents.commands),
+        loop=contents.loop and _loop(contents.loop, axes, center),
         document=contents,
     )
     faults = [_placed(finding, facts.root, name) for finding in correlation_findings(spacecraft)]
@@ -295,11 +293,6 @@ def _part(kind: type[Part], section: Any, **others: object) -> Part | None:
     return kind(**{**values, **others})
 
 
-def _given(section: Any, make: Callable[..., Part], *others: object) -> Part | None:
-    """The object that ``make`` makes of a section, where it is given."""
-    return None if section is None else make(section, *others)
-
-
 def _rates(contents: Any, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|,
     Magnus 1970 (19).
@@ -309,7 +302,6 @@ def _rates(contents: Any, inertia: Inertia) -> Vector:
     if contents.omega0 is not None:
         return np.asarray(inertia.axes.T @ np.array(contents.omega0))
     state = contents.state
-    assert state is not None
     first, second, _ = inertia.moments
     way = np.array([math.cos(state.phase), math.sin(state.phase)])
     moment = first if first == second else math.hypot(first * way[0], second * way[1])
@@ -326,9 +318,6 @@ def _thruster(entry: Any, axes: Vector, every: Any, center: Vector) -> Thruster:
         torque = axes.T @ np.array(entry.torque)
         thrust = thrust_behind(math.hypot(*entry.torque), entry.lever_arm)
     else:
-        assert entry.position is not None
-        assert entry.direction is not None
-        assert entry.force is not None
         thrust = entry.force
         arm = np.array(entry.position) - center
         push = force_vector(entry.direction, entry.force)
@@ -375,7 +364,6 @@ def _valve(entry: Any, every: Any, thrust: float | None) -> Valve | None:
             tuple((time, impulse / thrust, mean) for time, impulse, mean in entry.impulse_bit)
         )
     section = entry.valve or every
-    assert section is not None
     times = (section.open_delay, section.close_delay, section.rise_time, section.fall_time)
     return thruster.Trapezoid(*times, section.on_time_is == "effective") if any(times) else None
 
@@ -405,19 +393,20 @@ def _attitude(section: Any, inertia: Inertia, omega0: Vector, sunward: Vector | 
     if section.quaternion is not None:
         turn = np.array(section.quaternion) / math.hypot(*section.quaternion)
         return Attitude(turn, section.epoch, section.frame)
-    assert section.spin_axis is not None
+    from nutdamp.physics import frames  # directions in space
+
     along = np.array([0.0, 0.0, math.copysign(1.0, inertia.axial(float(omega0[2])))])
     if section.of == "momentum":
         along = inertia.momentum(omega0)
     body_axis = inertia.axes @ (along / np.linalg.norm(along))
-    axis = attitude.on_sphere(*section.spin_axis)
-    side = attitude.ascending_node(axis)
+    axis = frames.on_sphere(*section.spin_axis)
+    side = frames.ascending_node(axis)
     phase = section.phase or 0.0
     if section.sun_phase is not None:
         assert sunward is not None
         side = sunward
         phase = section.sun_phase
-    quaternion = attitude.about_axis(body_axis, np.array([1.0, 0.0, 0.0]), axis, side, phase)
+    quaternion = frames.about_axis(body_axis, np.array([1.0, 0.0, 0.0]), axis, side, phase)
     return Attitude(quaternion, section.epoch, section.frame)
 
 
@@ -425,27 +414,31 @@ def _goal(section: Any, spacecraft: Spacecraft) -> Goal:
     """The goal of a file; its tilt and azimuth count from the motion at t = 0."""
     if section is None:
         return Goal()
+    from nutdamp.physics import frames  # directions in space
+    from nutdamp.spacecraft import directions
+
+    axis = None
     if section.tilt is not None:
-        return Goal(spacecraft.direction_in_n(section.tilt, section.azimuth or 0.0), section.spin)
-    if section.right_ascension is not None and section.declination is not None:
-        return Goal(attitude.on_sphere(section.right_ascension, section.declination), section.spin)
-    if section.sun_angle is not None:
-        axis = spacecraft.at_sun_angle(section.sun_angle)
-        return Goal(axis, section.spin, sun_angle=section.sun_angle)
-    return Goal(spin=section.spin)
+        axis = directions.direction_in_n(spacecraft, section.tilt, section.azimuth or 0.0)
+    elif section.right_ascension is not None:
+        axis = frames.on_sphere(section.right_ascension, section.declination)
+    elif section.sun_angle is not None:
+        axis = directions.at_sun_angle(spacecraft, section.sun_angle)
+    return Goal(axis, section.spin, sun_angle=section.sun_angle)
 
 
 def _sun(contents: Any) -> Vector | None:
     sun: tuple[float, float] | str | None = contents.sun
-    if not isinstance(sun, str):
-        return None if sun is None else attitude.on_sphere(*sun)
-    assert contents.attitude is not None
-    assert contents.attitude.epoch is not None
-    from nutdamp.common.time import Epoch  # the Sun by the epoch
+    if sun is None:
+        return None
+    from nutdamp.common.time import Epoch  # a Sun
+    from nutdamp.physics import frames
     from nutdamp.physics.sky import sun_direction
 
+    if not isinstance(sun, str):
+        return frames.on_sphere(*sun)
     days = Epoch.parse(contents.attitude.epoch).days_of_j2000
-    return attitude.frame_axes(contents.attitude.frame, days).T @ sun_direction(days)
+    return frames.frame_axes(contents.attitude.frame, days).T @ sun_direction(days)
 
 
 def _cones(contents: Any, sunward: Vector | None) -> Iterator[Keep]:
@@ -453,8 +446,10 @@ def _cones(contents: Any, sunward: Vector | None) -> Iterator[Keep]:
     way.
     """
     for entry in contents.keep:
+        from nutdamp.physics import frames  # directions in space
+
         place: tuple[float, float] | str = entry.direction
-        direction = sunward if isinstance(place, str) else attitude.on_sphere(*place)
+        direction = sunward if isinstance(place, str) else frames.on_sphere(*place)
         assert direction is not None
         yield Keep(
             entry.name, direction, entry.min or 0.0, math.pi if entry.max is None else entry.max
@@ -502,7 +497,7 @@ def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the spacecraft file, for editors."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **SPACECRAFT.definition,
+        **definition(SPACECRAFT),
         "title": "nutdamp spacecraft file",
         "$defs": definitions(SPACECRAFT),
     }

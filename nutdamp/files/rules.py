@@ -22,165 +22,122 @@ from nutdamp.files.fields import SMALLEST, Finding
 from nutdamp.files.keys import BY_THRUSTER, VALVE_TIMES, by_name
 from nutdamp.files.yaml import KeyPath, dotted
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.spacecraft.tolerances import Tolerance
 from nutdamp.units import FASTEST, KINDS, bar, parse, reading, shown
 
-KEEP = "keep one of the two"
-SKY = "[right ascension, declination]"
-OF_DATE = ", the date of its equinox; or take ECLIPJ2000 or EME2000"
-SUN = f": {SKY}, or sun: epoch"
-POINTING = ", which says where the body points at t = 0"
-SAMPLED = ", such as rate: 100 Hz: it applies to samples"
-SENSED = ", whose sensor it is of"
-MOUNTING = ".position .direction .force"
-COMPONENT = "expected at least one component other than 0"
-TURNING = "only a rotating torque turns"
-EVERYWHERE = "a gyro measures the same everywhere"
-FED = "the tank needs it for the propellant used"
-RESERVED = f"the name {STEERABLE!r} is reserved for the steerable torquer; use another"
+_TABLE = """
+omega0 | missing | .state | give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}
+state | beside | .omega0 | keep one of the two
+inertia.A | missing | .tensor | the transverse moment of inertia, in kg m^2
+inertia.C | missing | .tensor | the axial moment of inertia, in kg m^2
+inertia.tensor | beside | .A .C | keep either tensor, or A and C
+attitude.quaternion | missing | .spin_axis | turn from body to frame, scalar first, or spin_axis:
+    [right ascension, declination]
+attitude.quaternion | not zero | | expected a rotation, such as [1, 0, 0, 0]
+attitude.spin_axis | beside | .quaternion | keep one of the two
+attitude.of | beside | .quaternion | keep one of the two
+attitude.phase | beside | .quaternion | keep one of the two
+attitude.sun_phase | beside | .quaternion .phase | keep one of the two
+attitude.sun_phase | needs | sun | : [right ascension, declination], or sun: epoch
+attitude.frame=ECLIPDATE | needs | .epoch | , the date of its equinox; or take ECLIPJ2000 or
+    EME2000
+attitude.frame=MOD | needs | .epoch | , the date of its equinox; or take ECLIPJ2000 or EME2000
+sun | needs | attitude | , which says where the body points at t = 0
+sun=epoch | needs | attitude.epoch | , the date of t = 0; or give [right ascension, declination]
+sun_sensor | needs | sun | : [right ascension, declination], or sun: epoch
+commands | needs | sun_sensor | , whose pulse fires the blocks
+commands.width.min | at most | .max | time
+orbit | needs | attitude.epoch attitude.frame | , which give time and axes of the position
+orbit.position | not zero | | expected the position of the spacecraft relative to center
+keep | once | name | take another
+keep.*.direction | needs | attitude | , which says where the body points at t = 0
+keep.*.direction=sun | needs | sun | : [right ascension, declination], or sun: epoch
+keep.*.min | missing | .max | give min, max or both; without them the cone has no effect
+keep.*.min | at most | .max | angle
+goal.tilt | beside | .right_ascension .declination | keep tilt and azimuth, or the other pair
+goal.tilt | completes | .azimuth | names no direction
+goal.declination | completes | .right_ascension | names no direction
+goal.right_ascension | completes | .declination | names no direction
+goal.right_ascension | needs | attitude | , which says where the body points at t = 0; without it
+    give tilt and azimuth
+goal.sun_angle | beside | .tilt .azimuth .right_ascension .declination | keep one target
+goal.sun_angle | needs | sun | : [right ascension, declination], or sun: epoch
+goal.spin | not zero | | expected a rate about axis 3
+requirement.probability | needs | .nutation/.momentum_shift/.pointing/.spin | : this is a share of
+    it
+requirement.pointing | beside | .momentum_shift | pointing counts from the target, momentum_shift
+    from t = 0; keep one of the two
+limits.earliest | below | .horizon | time
+limits.blackout.*.0 | at most | .1 | time
+disturbances | once | name | take another
+disturbances.*.torque | not zero | | expected at least one component other than 0
+disturbances.*.rate | not zero | | leave rate out for a torque fixed in the body
+disturbances.*.rate | beside | .kind=constant .kind=axial | only a rotating torque turns
+disturbances.*.fixed_in | beside | .kind=constant .kind=axial .rate | keep one of the two
+disturbances.*.from | below | .until | time
+disturbances.*.kind=rotating | needs | .rate/.fixed_in | , the rate seen in the body
+thrusters | once | name | take another
+thrusters.*.name=steerable | wrong | | the name 'steerable' is reserved for the steerable torquer;
+    use another
+thrusters.*.torque | missing | .position .direction .force | give torque, or position, direction
+    and force
+thrusters.*.torque | beside | .position .direction .force | keep torque, or position, direction
+    and force
+thrusters.*.torque | not zero | | expected at least one component other than 0
+thrusters.*.position | completes | .direction .force | cannot give a torque
+thrusters.*.direction | completes | .position .force | cannot give a torque
+thrusters.*.force | completes | .position .direction | cannot give a torque
+thrusters.*.direction | not zero | | expected a direction, such as [1, 0, 0]
+thrusters.*.lever_arm | beside | .position | leave it out: position gives the arm
+thrusters.*.min_on_time | at most | .max_on_time | time
+thrusters.*.impulse_bit | beside | .valve | keep one of the two
+thrusters.*.impulse_bit | needs | .force/.lever_arm | , which tells the thrust
+thrusters.*.impulse_bit | rising | time impulse time | expected rows that rise
+channels.steerable | wrong | | the name 'steerable' is reserved for the steerable torquer; use
+    another
+channels.* | once | | expected once in a channel
+channels.*.* | named | thruster |
+valve | needs | thrusters | , which it belongs to
+cold | needs | thrusters | , whose nozzles are meant
+tank | needs | thrusters | , which it feeds
+tank.final_pressure | at most | .pressure | pressure
+tank.propellant | below | mass | mass
+tank.isp | rising | pressure | expected rows that rise
+thrusters.*.isp | fed | tank.isp | the tank needs it for the propellant used
+thrusters.*.lever_arm | fed | .force | the tank needs it for the propellant used
+loop | needs | thrusters | , which it fires
+loop.stop | below | .start | angle
+loop.law=bang | needs | .on_time | , the length of its pulses
+loop.on_time | beside | .law=one-pulse | one-pulse fires as long as needed
+loop.sensor.kind=accelerometer | needs | .rate | : a sine is fitted to its samples
+loop.sensor.kind=accelerometer | needs | .position | , from the centre of mass
+loop.sensor.position | beside | .kind=gyro | a gyro measures the same everywhere
+loop.sensor.axis | beside | .kind=gyro | a gyro measures the same everywhere
+loop.sensor.axes | beside | .kind=accelerometer | it measures along axis
+loop.sensor.noise | needs | .rate | , such as rate: 100 Hz: it applies to samples
+loop.sensor.quantisation | needs | .rate | , such as rate: 100 Hz: it applies to samples
+loop.sensor.low_pass | needs | .rate | , such as rate: 100 Hz: it applies to samples
+loop.sensor.axis | not zero | | expected a direction, such as [0, 0, 1]
+loop.sensor.scale | not zero | | the sensor would show nothing; expected about 100 %
+loop.faults.reversed | once | | expected each channel once
+loop.faults.reversed.* | named | channel |
+dispersions.inertia_tensor | beside | .A .C | keep the tensor, or A and C
+dispersions.inertia_tensor | beside | wheel | the wheel is along principal axis 3, which would
+    move; give A and C instead
+dispersions.sensor_bias | needs | loop | , whose sensor it is of
+dispersions.sensor_scale | needs | loop | , whose sensor it is of
+dispersions.sensor_noise | needs | loop | , whose sensor it is of
+dispersions.sensor_delay | needs | loop | , whose sensor it is of
+"""
+RULES = [
+    [cell.strip() for cell in row.split("|")]
+    for row in _TABLE.replace("\n    ", " ").strip().split("\n")
+]
+"""Path | kind of rule | other keys | the cure, or the kind of a quantity.
 
-RULES = (
-    # Path; kind of rule; other keys (those beside it begin with a dot; | is or; =value only with
-    # that value), or kinds of quantity; the cure, or the kind of a quantity.
-    ("omega0", "missing", ".state", "give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}"),
-    ("state", "beside", ".omega0", KEEP),
-    ("inertia.A", "missing", ".tensor", "the transverse moment of inertia, in kg m^2"),
-    ("inertia.C", "missing", ".tensor", "the axial moment of inertia, in kg m^2"),
-    ("inertia.tensor", "beside", ".A .C", "keep either tensor, or A and C"),
-    (
-        "attitude.quaternion",
-        "missing",
-        ".spin_axis",
-        f"turn from body to frame, scalar first, or spin_axis: {SKY}",
-    ),
-    ("attitude.quaternion", "not zero", "", "expected a rotation, such as [1, 0, 0, 0]"),
-    ("attitude.spin_axis", "beside", ".quaternion", KEEP),
-    ("attitude.of", "beside", ".quaternion", KEEP),
-    ("attitude.phase", "beside", ".quaternion", KEEP),
-    ("attitude.sun_phase", "beside", ".quaternion .phase", KEEP),
-    ("attitude.sun_phase", "needs", "sun", SUN),
-    ("attitude.frame=ECLIPDATE", "needs", ".epoch", OF_DATE),
-    ("attitude.frame=MOD", "needs", ".epoch", OF_DATE),
-    ("sun", "needs", "attitude", POINTING),
-    ("sun=epoch", "needs", "attitude.epoch", f", the date of t = 0; or give {SKY}"),
-    ("sun_sensor", "needs", "sun", SUN),
-    ("commands", "needs", "sun_sensor", ", whose pulse fires the blocks"),
-    ("commands.width.min", "at most", ".max", "time"),
-    (
-        "orbit",
-        "needs",
-        "attitude.epoch attitude.frame",
-        ", which give time and axes of the position",
-    ),
-    (
-        "orbit.position",
-        "not zero",
-        "",
-        "expected the position of the spacecraft relative to center",
-    ),
-    ("keep", "once", "name", "take another"),
-    ("keep.*.direction", "needs", "attitude", POINTING),
-    ("keep.*.direction=sun", "needs", "sun", SUN),
-    ("keep.*.min", "missing", ".max", "give min, max or both; without them the cone has no effect"),
-    ("keep.*.min", "at most", ".max", "angle"),
-    (
-        "goal.tilt",
-        "beside",
-        ".right_ascension .declination",
-        "keep tilt and azimuth, or the other pair",
-    ),
-    ("goal.tilt", "completes", ".azimuth", "names no direction"),
-    ("goal.declination", "completes", ".right_ascension", "names no direction"),
-    ("goal.right_ascension", "completes", ".declination", "names no direction"),
-    ("goal.right_ascension", "needs", "attitude", f"{POINTING}; without it give tilt and azimuth"),
-    (
-        "goal.sun_angle",
-        "beside",
-        ".tilt .azimuth .right_ascension .declination",
-        "keep one target",
-    ),
-    ("goal.sun_angle", "needs", "sun", SUN),
-    ("goal.spin", "not zero", "", "expected a rate about axis 3"),
-    (
-        "requirement.probability",
-        "needs",
-        ".nutation|.momentum_shift|.pointing|.spin",
-        ": this is a share of it",
-    ),
-    (
-        "requirement.pointing",
-        "beside",
-        ".momentum_shift",
-        "pointing counts from the target, momentum_shift from t = 0; keep one of the two",
-    ),
-    ("limits.earliest", "below", ".horizon", "time"),
-    ("limits.blackout.*.0", "at most", ".1", "time"),
-    ("disturbances", "once", "name", "take another"),
-    ("disturbances.*.torque", "not zero", "", COMPONENT),
-    ("disturbances.*.rate", "not zero", "", "leave rate out for a torque fixed in the body"),
-    ("disturbances.*.rate", "beside", ".kind=constant .kind=axial", TURNING),
-    ("disturbances.*.fixed_in", "beside", ".kind=constant .kind=axial .rate", KEEP),
-    ("disturbances.*.from", "below", ".until", "time"),
-    ("disturbances.*.kind=rotating", "needs", ".rate|.fixed_in", ", the rate seen in the body"),
-    ("thrusters", "once", "name", "take another"),
-    ("thrusters.*.name=steerable", "wrong", "", RESERVED),
-    ("thrusters.*.torque", "missing", MOUNTING, "give torque, or position, direction and force"),
-    ("thrusters.*.torque", "beside", MOUNTING, "keep torque, or position, direction and force"),
-    ("thrusters.*.torque", "not zero", "", COMPONENT),
-    ("thrusters.*.position", "completes", ".direction .force", "cannot give a torque"),
-    ("thrusters.*.direction", "completes", ".position .force", "cannot give a torque"),
-    ("thrusters.*.force", "completes", ".position .direction", "cannot give a torque"),
-    ("thrusters.*.direction", "not zero", "", "expected a direction, such as [1, 0, 0]"),
-    ("thrusters.*.lever_arm", "beside", ".position", "leave it out: position gives the arm"),
-    ("thrusters.*.min_on_time", "at most", ".max_on_time", "time"),
-    ("thrusters.*.impulse_bit", "beside", ".valve", KEEP),
-    ("thrusters.*.impulse_bit", "needs", ".force|.lever_arm", ", which tells the thrust"),
-    ("thrusters.*.impulse_bit", "rising", "time impulse time", "expected rows that rise"),
-    ("channels.steerable", "wrong", "", RESERVED),
-    ("channels.*", "once", "", "expected once in a channel"),
-    ("channels.*.*", "named", "thruster", ""),
-    ("valve", "needs", "thrusters", ", which it belongs to"),
-    ("cold", "needs", "thrusters", ", whose nozzles are meant"),
-    ("tank", "needs", "thrusters", ", which it feeds"),
-    ("tank.final_pressure", "at most", ".pressure", "pressure"),
-    ("tank.propellant", "below", "mass", "mass"),
-    ("tank.isp", "rising", "pressure", "expected rows that rise"),
-    ("thrusters.*.isp", "fed", "tank.isp", FED),
-    ("thrusters.*.lever_arm", "fed", ".force", FED),
-    ("loop", "needs", "thrusters", ", which it fires"),
-    ("loop.stop", "below", ".start", "angle"),
-    ("loop.law=bang", "needs", ".on_time", ", the length of its pulses"),
-    ("loop.on_time", "beside", ".law=one-pulse", "one-pulse fires as long as needed"),
-    ("loop.sensor.kind=accelerometer", "needs", ".rate", ": a sine is fitted to its samples"),
-    ("loop.sensor.kind=accelerometer", "needs", ".position", ", from the centre of mass"),
-    ("loop.sensor.position", "beside", ".kind=gyro", EVERYWHERE),
-    ("loop.sensor.axis", "beside", ".kind=gyro", EVERYWHERE),
-    ("loop.sensor.axes", "beside", ".kind=accelerometer", "it measures along axis"),
-    ("loop.sensor.noise", "needs", ".rate", SAMPLED),
-    ("loop.sensor.quantisation", "needs", ".rate", SAMPLED),
-    ("loop.sensor.low_pass", "needs", ".rate", SAMPLED),
-    ("loop.sensor.axis", "not zero", "", "expected a direction, such as [0, 0, 1]"),
-    (
-        "loop.sensor.scale",
-        "not zero",
-        "",
-        "the sensor would show nothing; expected about 100 %",
-    ),
-    ("loop.faults.reversed", "once", "", "expected each channel once"),
-    ("loop.faults.reversed.*", "named", "channel", ""),
-    ("dispersions.inertia_tensor", "beside", ".A .C", "keep the tensor, or A and C"),
-    (
-        "dispersions.inertia_tensor",
-        "beside",
-        "wheel",
-        "the wheel is along principal axis 3, which would move; give A and C instead",
-    ),
-    ("dispersions.sensor_bias", "needs", "loop", SENSED),
-    ("dispersions.sensor_scale", "needs", "loop", SENSED),
-    ("dispersions.sensor_noise", "needs", "loop", SENSED),
-    ("dispersions.sensor_delay", "needs", "loop", SENSED),
-)
+Other keys beside that of the path begin with a dot; / is or; =value is the key only with that
+value. Rules of rising rows have the kinds of quantity of their columns there.
+"""
 
 
 def _broken(facts: Facts, path: KeyPath, kind: str, names: str, cure: str) -> Iterator[Finding]:
@@ -197,7 +154,7 @@ def _broken(facts: Facts, path: KeyPath, kind: str, names: str, cure: str) -> It
 
     def words(others: list[str]) -> str:
         alone = " and ".join(other.removeprefix(".") for other in others)
-        return alone.replace("|.", " or ").replace("=", ": ")
+        return alone.replace("/.", " or ").replace("=", ": ")
 
     others = names.split()
     exists = facts.has(*path)
@@ -207,7 +164,7 @@ def _broken(facts: Facts, path: KeyPath, kind: str, names: str, cure: str) -> It
         case "beside" if exists and present:
             yield Finding(path, f"given together with {words(present)}; {cure}", True)
         case "needs" if exists:
-            lacking = [other for other in others if not any(map(holds, other.split("|")))]
+            lacking = [other for other in others if not any(map(holds, other.split("/")))]
             if lacking:
                 yield Finding(path, f"needs {words(lacking)}{cure}", True)
         case "missing" if not exists and not present:

@@ -57,7 +57,8 @@ BLOCKS_HEADER = (
 
 # pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds
 MOST_FIRED = 5_000
-LATEST = 100_000  # number of the last Sun pulse that may fire a block
+HIGHEST = {"first_sun_pulse": 100_000, "count": MOST_FIRED, "every": 100_000}
+"""Columns of whole numbers from 1 on, and the highest of each."""
 
 
 def read_blocks(
@@ -134,53 +135,38 @@ def _block(row: Row, spacecraft: Spacecraft, columns: Mapping[str, str]) -> Bloc
             "channel",
             f"the spacecraft file has no channel {shown(name)}; {cure_of(name, channels)}",
         )
-    delay, width = (_time(row, spacecraft, name, column) for name, column in columns.items())
-    angle = 0.0
     commands = spacecraft.commands
-    if columns["delay"] == "delay_deg":
-        angle, delay = math.radians(delay or 0.0), 0.0
-    elif columns["delay"] == "delay_counts" and commands and commands.delay_is == ANGLE:
-        angle, delay = abs(spacecraft.spin) * (delay or 0.0), 0.0
-    if width == 0.0:
-        row.fault(columns["width"], "0 s fires nothing; expected a time above 0")
     row.setdefault("every", "1")
-    first = _whole(row, "first_sun_pulse", LATEST)
-    count = _whole(row, "count", MOST_FIRED)
-    every = _whole(row, "every", LATEST)
-    return Block(name, first, delay or 0.0, width or 0.0, count, every, angle)
-
-
-def _whole(row: Row, column: str, highest: int) -> int:
-    """A whole number of at least 1; 1 for a fault."""
-    value = row.number(column)
-    if value is not None and not (value.is_integer() and 1 <= value <= highest):
-        row.fault(column, f"expected a whole number from 1 to {highest}, got {row[column]}")
-    return int(value or 1)
-
-
-def _time(row: Row, spacecraft: Spacecraft, name: str, column: str) -> float | None:
-    """A delay or width, s: as it is given (deg in such a column), or so many steps; None for a
-    fault.
-    """
-    commands = spacecraft.commands
-    value = row.number(column)
-    counted = column.endswith("_counts")
-    if value is None:
-        return None
-    if value < 0.0:
-        row.fault(column, f"{row[column]} is negative; expected at least 0")
-    elif counted and not value.is_integer():
-        row.fault(column, f"expected a whole number of steps, got {row[column]}")
-    elif counted and commands is not None:
-        time = commands.time(name, value)
-        if time is None:
-            row.fault(
-                column,
-                f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, "
-                f"got {row[column]}",
-            )
-        return time
-    return value
+    numbers = dict.fromkeys((*TIMES, *HIGHEST), 1.0)
+    for key, column in (*columns.items(), *((column, column) for column in HIGHEST)):
+        value = row.number(column)
+        if value is None:
+            continue
+        numbers[key] = value
+        counted = column.endswith("_counts")
+        if column in HIGHEST:
+            if not (value.is_integer() and 1 <= value <= HIGHEST[column]):
+                expected = f"a whole number from 1 to {HIGHEST[column]}"
+                row.fault(column, f"expected {expected}, got {row[column]}")
+        elif value < 0.0:
+            row.fault(column, f"{row[column]} is negative; expected at least 0")
+        elif counted and not value.is_integer():
+            row.fault(column, f"expected a whole number of steps, got {row[column]}")
+        elif counted and commands is not None:
+            time = commands.time(key, value)
+            if time is None:
+                entries = f"the number of an entry of commands.width, 1 to {len(commands.widths)}"
+                row.fault(column, f"expected {entries}, got {row[column]}")
+            numbers[key] = 1.0 if time is None else time
+        if key == "width" and numbers[key] == 0.0:
+            row.fault(column, "0 s fires nothing; expected a time above 0")
+    delay, width, first, count, every = numbers.values()
+    angle = 0.0
+    if columns["delay"] == "delay_deg":
+        angle, delay = math.radians(delay), 0.0
+    elif columns["delay"] == "delay_counts" and commands and commands.delay_is == ANGLE:
+        angle, delay = abs(spacecraft.spin) * delay, 0.0
+    return Block(name, int(first), delay, width, int(count), int(every), angle)
 
 
 STARTS = ("start_s", "t_s")
@@ -273,21 +259,59 @@ Channels = Mapping[str, Channel]
 
 
 def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None:
-    """The pulse of a row, with a full tank; None for numbers that are none. Raises CellFault."""
+    """The pulse of a row, with a full tank; None for numbers that are none. Raises CellFault.
+
+    Starts and on-times are those of commands; the centre is that of the thrust, behind a valve too.
+    """
     name = row.get("channel") or STEERABLE
     if not name.isprintable():
         raise CellFault(
             "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
         )
     channel = channels.get(name)
-    timing = _timing(row, channel)
-    if timing is None:
+    column = next((column for column in STARTS if row.get(column)), None)
+    if column is None:
+        raise CellFault(STARTS[0], "the time is missing")
+    time, on_time = row.number(column), row.number("on_time_s")
+    if time is None or on_time is None:
         return None
-    t, on_time, start = timing
+    if on_time < 0.0:
+        raise CellFault(
+            "on_time_s",
+            f"{on_time:g} s is negative; 0 s or more is expected (0 for an ideal impulse)",
+        )
+    centre = 0.5 * on_time
+    valve = None if channel is None or on_time == 0.0 else channel.valve
+    if valve is not None:
+        shortest, longest = valve.known
+        if not shortest <= on_time <= longest:
+            row.fault(
+                "on_time_s",
+                f"{on_time:g} s is outside the impulse_bit of {shown(name)}, {shortest:g} "
+                f"s to {longest:g} s",
+            )
+        thrust = valve.thrust(on_time)
+        if not thrust.ramps:
+            row.warn(
+                f"closed {name}",
+                f"{on_time:g} s is too short for the valve of {shown(name)}: it does not open",
+            )
+        centre = thrust.centroid
+    late = column != STARTS[0]
+    start = time - centre if late else time
+    if start < -1e-9:  # s; an earlier start is no rounding of 0
+        raise CellFault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
+    t = max(time, centre) if late else max(start, 0.0) + centre
+    if not Pulse(t, on_time, "", np.zeros(3)).resolved:
+        raise CellFault(
+            "on_time_s",
+            f"{on_time:g} s is too short at {t:g} s, where times are "
+            f"{math.ulp(t + 0.5 * on_time):.2g} s apart",
+        )
     if channel is not None and on_time > 0.0:
-        if start is None:
+        if valve is None:
             return channel_pulse(channel, t, on_time)
-        return on_command(channel, start, on_time)
+        return on_command(channel, t - centre if late else max(start, 0.0), on_time)
     torque = _numbers(row, TORQUE) if on_time > 0.0 else None
     impulse = _numbers(row, IMPULSE) if torque is None else torque * on_time
     if impulse is None:
@@ -321,51 +345,6 @@ def _pulse(row: Row, spacecraft: Spacecraft, channels: Channels) -> Pulse | None
         rate = torquer.propellant_per_impulse
         propellant = None if rate is None else rate * size
     return Pulse(t, on_time, name, principal, push, None, propellant)
-
-
-def _timing(row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
-    """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
-    column = next((column for column in STARTS if row.get(column)), None)
-    if column is None:
-        raise CellFault(STARTS[0], "the time is missing")
-    time, on_time = row.number(column), row.number("on_time_s")
-    if time is None or on_time is None:
-        return None
-    if on_time < 0.0:
-        raise CellFault(
-            "on_time_s",
-            f"{on_time:g} s is negative; 0 s or more is expected (0 for an ideal impulse)",
-        )
-    centre = 0.5 * on_time
-    valve = None if channel is None or on_time == 0.0 else channel.valve
-    if channel is not None and valve is not None:
-        shortest, longest = valve.known
-        if not shortest <= on_time <= longest:
-            row.fault(
-                "on_time_s",
-                f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {shortest:g} "
-                f"s to {longest:g} s",
-            )
-        thrust = valve.thrust(on_time)
-        if not thrust.ramps:
-            row.warn(
-                f"closed {channel.name}",
-                f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not "
-                "open",
-            )
-        centre = thrust.centroid
-    start = time if column == STARTS[0] else time - centre
-    if start < -1e-9:  # s; an earlier start is no rounding of 0
-        raise CellFault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
-    t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
-    if not Pulse(t, on_time, "", np.zeros(3)).resolved:
-        raise CellFault(
-            "on_time_s",
-            f"{on_time:g} s is too short at {t:g} s, where times are "
-            f"{math.ulp(t + 0.5 * on_time):.2g} s apart",
-        )
-    begins = max(start, 0.0) if column == STARTS[0] else t - centre
-    return t, on_time, None if valve is None else begins
 
 
 def _missing(name: str, channels: Channels, on_time: float) -> str:

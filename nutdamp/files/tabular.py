@@ -12,8 +12,8 @@ import json
 import math
 import os
 import re
+import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -65,8 +65,17 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
             with target.open("wb") as stream:
                 yield stream
             return
-        with _replacing(target) as stream:
-            yield stream
+        temporary = target.with_name(f".nutdamp-{os.urandom(8).hex()}.part")
+        try:
+            with temporary.open("xb") as stream:
+                yield stream
+                stream.flush()
+                os.fsync(stream.fileno())
+            if target.exists():
+                shutil.copymode(target, temporary)
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
     except BrokenPipeError:
         raise
     except OSError as reason:
@@ -108,25 +117,6 @@ def make_folder(path: str) -> None:
         if isinstance(reason, FileExistsError):
             raise CannotWrite(path, "it is there, and no directory") from reason
         raise CannotWrite(path, _reason(reason)) from reason
-
-
-@contextmanager
-def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    """A temporary file that takes the place and mode of ``target`` where the block ends well."""
-    handle, name = tempfile.mkstemp(prefix=".nutdamp-", suffix=".part", dir=target.parent)
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~mask)
-        temporary.replace(target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 def number(value: float | None) -> str:

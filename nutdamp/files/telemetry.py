@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,50 +61,44 @@ def record_of(history: Contents, spacecraft: Spacecraft, schedule: Schedule) -> 
 
 TIMES = ("t_s", "utc")
 JUMPS = "; at ideal impulses a track has two rows: name their schedule by --schedule"
-RATES = {f"{name}_rad_s": (name, 1.0) for name in GYROS} | {
-    f"{name}_deg_s": (name, math.pi / 180.0) for name in GYROS
-}
-ANGLES = ("axis_ra_deg", "axis_dec_deg")
+DEGREE = math.pi / 180.0
+AROUND, UP = (-360.0, 360.0), (-90.0, 90.0)  # deg
+
+
+class Measurement(NamedTuple):
+    """Columns that go together, and the signals that they are.
+
+    A number times its ``factor`` is in SI; two angles, about axis 3 and up from the plane across
+    it, within their ``limits``, deg, are a direction; ``vector`` names one of length 1.
+    """
+
+    columns: tuple[str, ...]
+    signals: tuple[str, ...]
+    factor: float = 1.0
+    limits: tuple[tuple[float, float], ...] = ()
+    vector: str = ""
+
+
+ASPECTS = "sun_aspect_deg"
 CROSSED = ("crossing_azimuth_deg", "crossing_elevation_deg")
 TOWARDS = ("crossing_ra_deg", "crossing_dec_deg")
-ACCELERATIONS, ASPECTS = "acceleration_m_s2", "sun_aspect_deg"
-MEASURED = (
-    *RATES,
-    *ANGLES,
-    *AXIS,
-    *QUATERNION,
-    ACCELERATIONS,
-    *CROSSED,
-    *TOWARDS,
-    ASPECTS,
-    SUN_PULSE,
+MEASUREMENTS = (
+    *(Measurement((f"{name}_rad_s",), (name,)) for name in GYROS),
+    *(Measurement((f"{name}_deg_s",), (name,), DEGREE) for name in GYROS),
+    Measurement(("axis_ra_deg", "axis_dec_deg"), AXIS, limits=(AROUND, UP)),
+    Measurement(AXIS, AXIS, vector="axis"),
+    Measurement(QUATERNION, QUATERNION, vector="quaternion"),
+    Measurement(("acceleration_m_s2",), (ACCELERATION,)),
+    Measurement(CROSSED, SEEN, limits=(AROUND, UP)),
+    Measurement(TOWARDS, DIRECTION, limits=(AROUND, UP)),
+    Measurement((ASPECTS,), (SUN_ASPECT,), DEGREE, ((0.0, 180.0),)),
 )
-"""Columns of samples: crossings are of what is TOWARDS, else of the Sun; SUN_PULSE is 1 from one
-seen on.
-"""
+"""Crossings are of what is TOWARDS, else of the Sun."""
 
-LIMITS = {
-    ANGLES[0]: (-360.0, 360.0),
-    ANGLES[1]: (-90.0, 90.0),
-    CROSSED[0]: (-360.0, 360.0),
-    CROSSED[1]: (-90.0, 90.0),
-    TOWARDS[0]: (-360.0, 360.0),
-    TOWARDS[1]: (-90.0, 90.0),
-    ASPECTS: (0.0, 180.0),
-}
-"""Least and largest angles of columns, deg."""
+MEASURED = (*(name for group in MEASUREMENTS for name in group.columns), SUN_PULSE)
+"""Columns of samples; SUN_PULSE is 1 from one seen on."""
 
 UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
-TWICE = {
-    TIMES[1]: TIMES[0],
-    ANGLES[0]: AXIS[0],
-    **{f"{name}_deg_s": f"{name}_rad_s" for name in GYROS},
-}
-"""Columns, and those of the same in other units."""
-
-GROUPS = (ANGLES, AXIS, QUATERNION, CROSSED, TOWARDS)
-"""Columns that go together."""
-
 SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
 
@@ -157,14 +152,18 @@ def _read_samples(
     header = table.header
     if not table.faults and not {*MEASURED} & {*header}:
         table.fault(1, "", f"no column of samples; expected one or more of {', '.join(MEASURED)}")
-    for name, other in TWICE.items():
-        if name in header and other in header:
-            table.fault(1, name, f"given twice, also as {other}; remove one of them")
-    for group in GROUPS:
-        present = [name for name in group if name in header]
-        for name in group if present else ():
+    times = (Measurement((name,), TIMES) for name in TIMES)
+    before: dict[tuple[str, ...], str] = {}  # first column of the same in other units
+    for group in (*times, *MEASUREMENTS):
+        first = next((name for name in group.columns if name in header), None)
+        if first is None:
+            continue
+        for name in group.columns:
             if name not in header:
-                table.fault(1, name, f"the column is missing; {present[0]} needs it")
+                table.fault(1, name, f"the column is missing; {first} needs it")
+        other = before.setdefault(group.signals, first)
+        if other != first:
+            table.fault(1, first, f"given twice, also as {other}; remove one of them")
     if TOWARDS[0] in header and CROSSED[0] not in header:
         table.fault(1, CROSSED[0], f"the column is missing beside {TOWARDS[0]}")
     if CROSSED[0] in header and TOWARDS[0] not in header and spacecraft.sun is None:
@@ -173,7 +172,7 @@ def _read_samples(
         )
     table.expect()
     impulses = [pulse.t for pulse in schedule if pulse.on_time == 0.0]
-    times, columns = _samples(table, spacecraft, impulses)
+    moments, columns = _samples(table, spacecraft, impulses)
     table.check()
     signals = _signals(table, columns, spacecraft)
     for name in sorted(KIND.keys() & signals.keys()):
@@ -184,14 +183,14 @@ def _read_samples(
                 f"{path}: {name}: {out.sum()} samples are left out, because no motion can give them"
             )
     _expect_unit(table, signals, spacecraft.spin)
-    seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
+    seen, step = _sun_column(table, moments, columns.get(SUN_PULSE))
     table.check()
     # A track has the motion before and after an impulse at one time: neither is a sample.
-    jumps = np.flatnonzero(np.diff(times) == 0.0)
+    jumps = np.flatnonzero(np.diff(moments) == 0.0)
     both = np.concatenate([jumps, jumps + 1])
-    times = np.delete(times, both)
+    moments = np.delete(moments, both)
     signals = {name: np.delete(values, both) for name, values in signals.items()}
-    return Record(times, signals, seen, step, schedule), table.warned
+    return Record(moments, signals, seen, step, schedule), table.warned
 
 
 def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
@@ -242,11 +241,11 @@ def _samples(
             row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows
         )
         columns[name] = np.array([math.nan if number is None else number for number in numbers])
-    for name, (low, high) in LIMITS.items():
-        if name not in columns:
-            continue
-        wrong = (columns[name] < low) | (columns[name] > high)
-        _fault_first(table, wrong, name, f"expected an angle of {low:g} to {high:g} deg")
+    for group in MEASUREMENTS:
+        for name, (low, high) in zip(group.columns, group.limits, strict=False):
+            values = columns.get(name, np.empty(0))
+            wrong = (values < low) | (values > high)
+            _fault_first(table, wrong, name, f"expected an angle of {low:g} to {high:g} deg")
     return np.array(moments), columns
 
 
@@ -267,52 +266,30 @@ def _signals(
     """Measured body rates, axis, attitude, directions and acceleration, in SI; quaternions go
     before the axis.
     """
-    signals = {
-        RATES[name][0]: RATES[name][1] * values for name, values in columns.items() if name in RATES
-    }
-    if ACCELERATIONS in columns:
-        signals[ACCELERATION] = columns[ACCELERATIONS]
-    if ASPECTS in columns:
-        signals[SUN_ASPECT] = np.radians(columns[ASPECTS])
-    if ANGLES[0] in columns:
-        signals |= dict(zip(AXIS, _towards(columns, ANGLES).T, strict=True))
-    elif AXIS[0] in columns:
-        signals |= dict(zip(AXIS, _unit(table, columns, AXIS, "axis").T, strict=True))
-    if QUATERNION[0] in columns:
-        signals |= of_quaternions(_unit(table, columns, QUATERNION, "quaternion"), spacecraft)
-    if CROSSED[0] in columns:
-        seen = _towards(columns, CROSSED)
-        to = (
-            _towards(columns, TOWARDS)
-            if TOWARDS[0] in columns
-            else np.full((len(table.rows), 3), math.nan)
-        )
-        if spacecraft.sun is not None:
-            to = np.where(np.isfinite(to), to, spacecraft.sun)
-        signals |= dict(zip((*SEEN, *DIRECTION), np.column_stack([seen, to]).T, strict=True))
+    signals: dict[str, Vector] = {}
+    for names, own, factor, limits, vector in MEASUREMENTS:
+        if names[0] not in columns:
+            continue
+        values = np.column_stack([columns[name] for name in names]) * factor
+        if vector:
+            sizes = np.linalg.norm(values, axis=1)
+            wrong = np.abs(sizes - 1.0) > UNIT_LENGTH
+            problem = f"the {vector} has length {sizes[wrong.argmax()]:.4g}; expected 1"
+            _fault_first(table, wrong, names[0], problem)
+            values = values / np.where(wrong, 1.0, sizes)[:, None]
+        elif len(limits) == 2:
+            around, up = np.radians(values).T
+            across = np.cos(up)
+            values = np.column_stack([across * np.cos(around), across * np.sin(around), np.sin(up)])
+        if own == QUATERNION:
+            signals |= of_quaternions(values, spacecraft)
+        else:
+            signals |= dict(zip(own, values.T, strict=True))
+    if SEEN[0] in signals and spacecraft.sun is not None:
+        for name, part in zip(DIRECTION, spacecraft.sun.tolist(), strict=True):
+            to = signals.get(name, np.full(len(table.rows), math.nan))
+            signals[name] = np.where(np.isfinite(to), to, part)
     return {name: values for name, values in signals.items() if np.isfinite(values).any()}
-
-
-def _towards(columns: Mapping[str, Vector], names: Sequence[str]) -> Vector:
-    """Unit vectors (n, 3) by two columns of angles: about axis 3,
-    and up from the plane across it.
-    """
-    around, up = (np.radians(columns[name]) for name in names)
-    across = np.cos(up)
-    return np.column_stack([across * np.cos(around), across * np.sin(around), np.sin(up)])
-
-
-def _unit(table: Table, columns: Mapping[str, Vector], names: Sequence[str], what: str) -> Vector:
-    """Vectors (n, k) of length 1 by their columns;
-    a fault for the first that has another length.
-    """
-    vectors = np.column_stack([columns[name] for name in names])
-    sizes = np.linalg.norm(vectors, axis=1)
-    wrong = np.abs(sizes - 1.0) > UNIT_LENGTH
-    _fault_first(
-        table, wrong, names[0], f"the {what} has length {sizes[wrong.argmax()]:.4g}; expected 1"
-    )
-    return np.asarray(vectors / np.where(wrong, 1.0, sizes)[:, None])
 
 
 def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> None:
@@ -320,10 +297,13 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     name = GYROS[2]
     if name not in signals or spin == 0.0:
         return
-    column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
+    column, own = next(
+        (group.columns[0], group.factor)
+        for group in MEASUREMENTS
+        if group.signals == (name,) and group.columns[0] in table.header
+    )
     ratio = abs(float(np.nanmedian(signals[name])) / spin)
     units = KINDS["rate"].factors.items()
-    own = RATES[column][1]
     meant = [
         (own / size, f"are the values of this column in {unit}")
         for unit, size in units

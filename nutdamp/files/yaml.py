@@ -130,20 +130,18 @@ class Node:
             return [child.plain() for child in self.value]
         return self.value
 
-    def place_of(self, path: KeyPath) -> Place:
-        """Place of the value at ``path``, or of the innermost of its parents that exists."""
+    def place_of(self, path: KeyPath, *, key: bool = False) -> Place:
+        """Place of the value at ``path``, or of its ``key`` where it has one; of the innermost of
+        its parents where there is none.
+        """
+        parent = self.get(*path[:-1]) if key and path else None
+        if parent is not None and path[-1] in parent.keys:
+            return parent.keys[str(path[-1])]
         for length in range(len(path), 0, -1):
             node = self.get(*path[:length])
             if node is not None:
                 return node.place
         return self.place
-
-    def key_place_of(self, path: KeyPath) -> Place:
-        """Place of the key of ``path``; of a list entry or the root, that of the value."""
-        parent = self.get(*path[:-1]) if path else None
-        if parent is not None and isinstance(path[-1], str) and path[-1] in parent.keys:
-            return parent.keys[path[-1]]
-        return self.place_of(path)
 
 
 def dotted(path: KeyPath) -> str:
@@ -292,13 +290,23 @@ class _Builder:
         return root
 
     def node(self, event: yaml.Event, path: KeyPath) -> Node:
+        """The value that begins with an event, up to the last of its events."""
         place = _at(event.start_mark)
+        repeated: Node | None = None
         if isinstance(event, yaml.AliasEvent):
-            node = self.alias(event, path)
-            self.count(node.size, place, path)
-            return node
+            name = str(event.anchor)
+            repeated = self.anchors.get(name)
+            if repeated is None:
+                problem = f"has no anchor &{name} above it"
+                if name in self.anchors:
+                    problem = "lies inside the value it repeats"
+                raise self.fatal(place, f"alias {shown('*' + name)} {problem}", path)
+        self.nodes += 1 if repeated is None else repeated.size
+        if self.nodes > MAX_NODES:  # aliases within aliases are a bomb
+            raise self.fatal(place, f"more than {MAX_NODES} values (aliases unfolded)", path[:1])
+        if repeated is not None:
+            return repeated
         assert isinstance(event, yaml.NodeEvent)
-        self.count(1, place, path)
         if len(path) > MAX_DEPTH:
             raise self.fatal(place, f"nested more than {MAX_DEPTH} levels deep")
         if event.anchor is not None:
@@ -307,82 +315,44 @@ class _Builder:
             # the text of a block ends in a line break
             end = _at(event.end_mark).offset - (event.style in ("|", ">"))
             node = Node(self.scalar(event, path), place, end=end)
-        elif isinstance(event, yaml.SequenceStartEvent):
-            node = self.sequence(event, path)
         else:
-            node = self.mapping(event, path)
+            assert isinstance(event, yaml.CollectionStartEvent)
+            node = self.collection(event, path)
         if event.anchor is not None:
             self.anchors[event.anchor] = node
         return node
 
-    def count(self, nodes: int, place: Place, path: KeyPath) -> None:
-        """Adds to the number of values and stops bombs."""
-        self.nodes += nodes
-        if self.nodes > MAX_NODES:
-            raise self.fatal(place, f"more than {MAX_NODES} values (aliases unfolded)", path[:1])
-
-    def alias(self, event: yaml.AliasEvent, path: KeyPath) -> Node:
-        name = str(event.anchor)
-        node = self.anchors.get(name)
-        if node is not None:
-            return node
-        problem = (
-            "lies inside the value it repeats"
-            if name in self.anchors
-            else f"has no anchor &{name} above it"
-        )
-        raise self.fatal(_at(event.start_mark), f"alias {shown('*' + name)} {problem}", path)
-
-    def sequence(self, event: yaml.SequenceStartEvent, path: KeyPath) -> Node:
-        self.check_tag(event.tag, ("seq",), _at(event.start_mark), path)
+    def collection(self, event: yaml.CollectionStartEvent, path: KeyPath) -> Node:
+        """A list or mapping; a key that comes again is reported and its value dropped."""
+        mapping = isinstance(event, yaml.MappingStartEvent)
+        self.check_tag(event.tag, ("map" if mapping else "seq",), _at(event.start_mark), path)
         entries: list[Node] = []
-        while not isinstance(entry := self.next(), yaml.SequenceEndEvent):
-            entries.append(self.node(entry, (*path, len(entries))))
-        return self.collection(entries, entries, event, entry)
-
-    def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
-        """A mapping, up to its end event;
-        a key that comes again is reported and its value dropped.
-        """
-        assert isinstance(event, yaml.MappingStartEvent)
-        self.check_tag(event.tag, ("map",), _at(event.start_mark), path)
-        values: dict[str, Node] = {}
         keys: dict[str, Place] = {}
-        while not isinstance(key := self.next(), yaml.MappingEndEvent):
-            place = _at(key.start_mark)
-            if not isinstance(key, yaml.ScalarEvent):
-                raise self.fatal(place, "a key must be a plain text", path)
-            text = self.characters(key.value, place, path)
-            self.check_tag(key.tag, ("str",), place, (*path, text))
-            if key.anchor is not None:
-                self.anchors[key.anchor] = Node(text, place)
-            value = self.node(self.next(), (*path, text))
-            if text in values:
-                self.faults.append(
-                    place.fault(
-                        self.name,
-                        dotted((*path, text)),
-                        f"duplicate key; already given at {keys[text]}; remove one of them",
-                    )
-                )
-            else:
-                values[text], keys[text] = value, place
-        node = self.collection(values, [*values.values()], event, key)
-        node.keys = keys
-        return node
-
-    def collection(
-        self,
-        value: dict[str, Node] | list[Node],
-        entries: list[Node],
-        begin: yaml.CollectionStartEvent,
-        end: yaml.Event,
-    ) -> Node:
-        """A list or mapping between two events; a block ends with its last entry."""
+        while not isinstance(begin := self.next(), yaml.CollectionEndEvent):
+            step: str | int = len(entries)
+            place = _at(begin.start_mark)
+            if mapping:
+                if not isinstance(begin, yaml.ScalarEvent):
+                    raise self.fatal(place, "a key must be a plain text", path)
+                step = self.characters(begin.value, place, path)
+                self.check_tag(begin.tag, ("str",), place, (*path, step))
+                if begin.anchor is not None:
+                    self.anchors[begin.anchor] = Node(step, place)
+                begin = self.next()
+            entry = self.node(begin, (*path, step))
+            if step in keys:
+                first = keys[str(step)]
+                problem = f"duplicate key; already given at {first}; remove one of them"
+                self.faults.append(place.fault(self.name, dotted((*path, step)), problem))
+                continue
+            entries.append(entry)
+            if mapping:
+                keys[str(step)] = place
+        flow = bool(event.flow_style) or not entries
+        end = _at(begin.end_mark).offset if flow else entries[-1].end  # of a block its last entry's
         size = 1 + sum(entry.size for entry in entries)
-        flow = bool(begin.flow_style) or not entries
-        last = _at(end.end_mark).offset if flow else entries[-1].end
-        return Node(value, _at(begin.start_mark), size=size, end=last, flow=flow)
+        value = dict(zip(keys, entries, strict=True)) if mapping else entries
+        return Node(value, _at(event.start_mark), keys, size, end, flow)
 
     def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
         """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag
@@ -390,11 +360,8 @@ class _Builder:
         """
         place = _at(event.start_mark)
         text = self.characters(event.value, place, path)
-        if event.tag is None:
-            return text if event.style else resolve(text)
-        if event.tag in ("!", f"{_CORE}str"):
-            return text
-        value = resolve(text)
+        quoted = event.style is not None and event.tag is None
+        value = text if quoted or event.tag in ("!", f"{_CORE}str") else resolve(text)
         self.check_tag(event.tag, _TAGS[type(value)], place, path)
         return float(value) if event.tag == f"{_CORE}float" and isinstance(value, int) else value
 

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -14,8 +15,7 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.physics import motion
-from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies, Falling, Forcing, Torque, driven_by
+from nutdamp.physics.motion import Bodies, Falling, Forcing, MotionStretch, Piece, Torque, driven_by
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import (
     BLOWDOWN,
@@ -81,63 +81,16 @@ class Joined:
         return joined(self.parts, times)
 
 
-@dataclass(frozen=True, slots=True)
-class Arc:
-    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s."""
+def free_coast(
+    inertia: Inertia, state: SpinState, start: float = 0.0, growth: float = 0.0, sense: float = 1.0
+) -> Piece:
+    """Coast without external torque in closed form, from ``state`` at ``start`` s, for any time.
 
-    A: float
-    C: float
-    start: float
-    state: SpinState
-    growth: float = 0.0  # κ of `energy_sink`, 1/s
-    wheel: float = 0.0  # h, N m s
-    sense: float = 1.0  # of the spin axis, for the growth
-    steps: int = 0
-
-    @classmethod
-    def of(cls, inertia: Inertia, state: SpinState, start: float = 0.0) -> Arc:
-        """Coast of a body without dissipation."""
-        return cls(inertia.A, inertia.C, start, state, wheel=inertia.wheel)
-
-    def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        since = np.asarray(times, dtype=float) - self.start
-        rates, quaternion = np.empty((len(since), 3)), np.empty((len(since), 4))
-        for array, columns in zip((rates, quaternion), self._after(since), strict=True):
-            for index, column in enumerate(columns):
-                array[:, index] = column
-        return rates, quaternion
-
-    def end(self, time: float) -> SpinState:
-        """State at ``time`` s."""
-        (first, second, third), quaternion = self._after(time - self.start)
-        return SpinState(complex(first, second), third, np.array(quaternion))
-
-    def _after(self, since: Any) -> Any:
-        state, forcing = self.state, Forcing((), self.growth, self.wheel, self.sense)
-        rates = state.omega.real, state.omega.imag, state.spin
-        return motion.arc(self.A, self.C, forcing, rates, state.quaternion.tolist(), since)
-
-
-@dataclass(frozen=True, slots=True)
-class FreeCoast:
-    """Coast of a rigid body with any principal ``moments`` in closed form, from ``state`` at
-    ``start`` s.
+    ``growth`` κ of `energy_sink`, 1/s, with I1 = I2 alone, as a wheel; ``sense`` of the spin axis.
     """
-
-    moments: tuple[float, float, float]
-    start: float
-    state: SpinState
-    steps: int = 0
-
-    def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
-        from nutdamp.physics import triaxial  # three different moments
-
-        since = np.asarray(times) - self.start
-        rates = self.state.rates
-        turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
-        return triaxial.free_rates(self.moments, rates, since), turned
+    forcing = Forcing((), growth, inertia.wheel, sense)
+    bodies = Bodies(np.array(inertia.moments), np.zeros(3), forcing)
+    return Piece(MotionStretch(bodies, start, state.rates, state.quaternion), math.inf)
 
 
 LONG = 20.0
@@ -164,7 +117,7 @@ class Push(NamedTuple):
     falling: Falling | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Dynamics:
     """Body as flown, with all torques besides the pulses; ``known``: the legs flown before, see
     `remembering`.
@@ -181,13 +134,17 @@ class Dynamics:
         """
         return replace(self, known={})
 
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Body as `motion` has it."""
+        return Bodies(np.array(self.moments), self.constant, self.forcing)
+
     @property
     def free(self) -> bool:
         """True if coasts are arcs of a symmetric body without external torque, known in closed
         form.
         """
-        driven = self.constant.any() or self.forcing.turning or self.forcing.timed
-        return not driven and self.moments[0] == self.moments[1]
+        return self.bodies.free
 
     def path(
         self,
@@ -224,62 +181,22 @@ class Dynamics:
         self, state: SpinState, start: float, end: float, push: Push, most: int
     ) -> tuple[Path, SpinState]:
         work.spend(LEG)
-        torques, slope, falling = push
-        if end == start or (self.free and not torques and falling is None):
-            _, growth, wheel, sense, _ = self.forcing
-            arc = Arc(self.moments[0], self.moments[2], start, state, growth, wheel, sense)
-            return arc, state if end == start else arc.end(end)
-        torque = np.asarray(sum(torques, np.zeros(3)))
-        long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
-        if (
-            long
-            and falling is None
-            and slope is None
-            and not torque.any()
-            and not self.constant.any()
-            and self.forcing == Forcing()
-        ):
-            coast = FreeCoast(self.moments, start, state)
-            (rates,), (quaternion,) = coast.motion(np.array([end]))
-            work.spend(PULSE)
-            return coast, SpinState.of(rates, quaternion)
-        stretch = MotionStretch(
-            Bodies(np.array(self.moments), self.constant, self.forcing),
-            start,
-            state.rates,
-            state.quaternion.copy(),
-            torque,
-            slope,
-            falling,
+        torque = np.sum(push.torques, axis=0) if push.torques else None
+        quaternion = state.quaternion.copy()
+        here = MotionStretch(
+            self.bodies, start, state.rates, quaternion, torque, push.slope, push.falling
         )
-        if self.forcing.timed:
-            return self._between_edges(stretch, state, end, push, most)
-        pieces = tuple(motion.polynomials(stretch, end - start, most))
-        step = SUNK_STEP if self.forcing.growth != 0.0 else STEP
-        work.spend(PULSE + step * len(pieces))
-        path = Joined([(piece.start, piece.motion) for piece in pieces], len(pieces))
+        if end == start:
+            return Piece(here, 0.0), state
+        pieces = list(motion.pieces(here, end - start, most, LONG))
+        steps = sum(piece.steps for piece in pieces)
+        if steps or not self.free:
+            step = SUNK_STEP if self.forcing.growth != 0.0 else STEP
+            work.spend(PULSE + step * steps)
+        path: Path = pieces[0]
+        if len(pieces) > 1:
+            path = Joined([(float(piece.start), piece.motion) for piece in pieces], steps)
         return path, SpinState.of(*pieces[-1].end())
-
-    def _between_edges(
-        self, stretch: MotionStretch, state: SpinState, end: float, push: Push, most: int
-    ) -> tuple[Path, SpinState]:
-        """Path of a ``stretch`` to ``end`` s, each part under the same torques as of a body of its
-        own.
-        """
-        parts = list[tuple[float, Path]]()
-        for part, length in motion.between_edges(stretch, end - stretch.since):
-            bodies, start = part.bodies, float(part.since)
-            plain = replace(self, constant=bodies.constant, forcing=bodies.forcing)
-            torques = [part.torque] if push.torques and part.torque is not None else []
-            pushed = Push(torques, part.slope, part.falling)
-            body = plain.with_moments(bodies.moments)
-            path, state = body._path(state, start, start + length, pushed, most)
-            most -= path.steps
-            parts.append((start, path))
-            stretch.rates[:] = state.rates
-            stretch.quaternion[:] = state.quaternion
-        steps = sum(path.steps for _, path in parts)
-        return Joined([(start, path.motion) for start, path in parts], steps), state
 
     def command(self, pulse: Pulse) -> None:
         """Take note of a pulse before it is flown:

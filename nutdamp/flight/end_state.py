@@ -29,27 +29,29 @@ mirror image.
 
 
 def momentum_gained(flown: Flight) -> Vector:
-    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a
-    radian.
-    """
+    """∫ R(t) F dt over all pulses, (3,) N s."""
     gained = np.zeros(3)
-    nodes, weights = np.array(
-        [(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]
-    ).T
     for leg in flown.legs:
         firing = [p for p in flown.schedule if p.thrust[0] <= leg.start and leg.end <= p.thrust[1]]
         if leg.end == leg.start or not any(p.force is not None and p.force.any() for p in firing):
             continue
         ends = leg.path.motion(np.array([leg.start, leg.end]))[0]
-        turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
-        edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
-        middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
-        times = (middles[:, None] + half * nodes).ravel()
-        pushes = attitude.rotate(leg.path.motion(times)[1], _forces(firing, times)).reshape(
-            -1, len(nodes), 3
-        )
-        gained += half * np.einsum("snc,n->c", pushes, weights)
+        times, weights = _quadrature(leg.start, leg.end, np.linalg.norm(ends, axis=1))
+        gained += weights @ attitude.rotate(leg.path.motion(times)[1], _forces(firing, times))
     return gained
+
+
+def _quadrature(begin: float, end: float, rates: Vector) -> tuple[Vector, Vector]:
+    """Times (n,) s from ``begin`` to ``end`` and weights of Gauss and Legendre, on stretches of at
+    most half a radian at the largest of ``rates``, rad/s.
+    """
+    nodes, weights = np.array(
+        [(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]
+    ).T
+    count = max(math.ceil(float(rates.max()) * (end - begin) / 0.5), 1)
+    half = 0.5 * (end - begin) / count
+    middles = begin + half * (2.0 * np.arange(count) + 1.0)
+    return (middles[:, None] + half * nodes).ravel(), np.tile(half * weights, count)
 
 
 def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
@@ -104,24 +106,15 @@ def seen_at(flight: Flight, time: float) -> Flight:
 def spin_phases(flight: Flight, times: Vector) -> Vector:
     """Magnus 1970 (2): α = ∫ω3 dt from t = 0 to each of the ascending ``times`` (n,) s, rad.
 
-    By Simpson's rule over stretches of at most half a radian, exact where ω3 is constant or changes
-    linearly.
+    Over stretches of at most half a radian, exact where ω3 is constant or changes linearly.
     """
     last = float(times[-1]) if len(times) else 0.0
     edges = sorted({0.0, *times.tolist(), *(leg.end for leg in flight.legs if leg.end <= last)})
     phases = {0.0: 0.0}
-    phase = 0.0
     for begin, end in pairwise(edges):
-        spins = abs(flight.motion(np.array([begin, end]))[0][:, 2])
-        count = 2 * math.ceil(float(spins.max()) * (end - begin) / 0.5) + 2
-        spin = flight.motion(np.linspace(begin, end, count + 1)[:-1])[0][:, 2]
-        final = flight.motion(np.array([np.nextafter(end, begin)]))[0][
-            0, 2
-        ]  # before a jump at the end
-        weights = np.ones(count)
-        weights[1::2], weights[2::2] = 4.0, 2.0
-        phase += (end - begin) / (3.0 * count) * float(weights @ spin + final)
-        phases[end] = phase
+        spins = np.abs(flight.motion(np.array([begin, end]))[0][:, 2])
+        at, weights = _quadrature(begin, end, spins)
+        phases[end] = phases[begin] + float(weights @ flight.motion(at)[0][:, 2])
     return np.array([phases[time] for time in times.tolist()])
 
 

@@ -1,6 +1,6 @@
 """Dispersed cases: body, initial motion and impulses of each case.
 
-All is elementwise over cases; what nothing disperses stays one number for all of them.
+Arrays carry the case last; what nothing disperses is the same in all of them.
 """
 
 from __future__ import annotations
@@ -8,78 +8,35 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.flight.dynamics import Supply, shed
 from nutdamp.montecarlo.inputs import BY_VALVE, TENSOR, Draws, Group, groups_of, list_inputs
 from nutdamp.physics import attitude
-from nutdamp.physics.body import DEGENERATE
 from nutdamp.physics.sky import AxisWatch
-from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, possible, spread
+from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, action, possible
 from nutdamp.spacecraft.equipment import Thruster
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
-Cases = (
-    Any  # one number for all cases, or an array (n,): real, or complex for complex-step derivatives
-)
-
-Triple = tuple[Cases, Cases, Cases]
+Array = NDArray[np.float64]
 
 
-def plus(first: Cases, second: Cases) -> Cases:
-    """Sum that costs nothing where one side is exactly zero for all cases."""
-    if nothing(first):
-        return second
-    return first if nothing(second) else first + second
-
-
-def times(first: Cases, second: Cases) -> Cases:
-    """Product that costs nothing where one side is exactly zero for all cases."""
-    return 0.0 if nothing(first) or nothing(second) else first * second
-
-
-def nothing(value: Cases) -> bool:
-    """True if exactly zero for all cases."""
-    return isinstance(value, float) and value == 0.0
-
-
-def cross(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
-    """Vector product by components."""
-    (a, b, c), (x, y, z) = first, second
-    return (
-        plus(times(b, z), times(-1.0, times(c, y))),
-        plus(times(c, x), times(-1.0, times(a, z))),
-        plus(times(a, y), times(-1.0, times(b, x))),
-    )
-
-
-def added(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
-    """Sum of vectors."""
-    return triple(map(plus, first, second))
-
-
-def scaled(vector: Sequence[Cases], factor: Cases) -> Triple:
-    """A vector times a factor."""
-    if isinstance(factor, float) and factor == 1.0:
-        return triple(vector)
-    return triple(times(part, factor) for part in vector)
-
-
-def triple(parts: Iterable[Cases]) -> Triple:
-    """Three components, numbers for all cases or arrays."""
+def triple(parts: Iterable[Any]) -> tuple[Any, Any, Any]:
+    """Three components, numbers or arrays."""
     x, y, z = parts
     return x, y, z
 
 
-def parts_of(vector: Vector) -> Triple:
-    """Components of one vector (3,)."""
-    return triple(vector.tolist())
+def vector_of(draws: Draws, names: Iterable[str]) -> Array:
+    """Draws of the components ``names`` of a vector, (3, n), or (3, 1) where none is drawn."""
+    parts = (np.atleast_1d(draws.get(name, 0.0)) for name in names)
+    return np.array(np.broadcast_arrays(*parts), dtype=np.float64)
 
 
 def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
@@ -93,29 +50,20 @@ def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
     return first, np.cross(along, first)
 
 
-def tilted(first: Cases, second: Cases) -> tuple[Cases, Cases]:
-    """cos φ and sin φ / φ of the rotation vector with these two components."""
-    angle = np.sqrt(first * first + second * second) + TINY
+def rotated(vector: ArrayLike, tilt: Any) -> Array:
+    """``vector`` (3, n) turned by the rotation vector (``tilt``, 0), rad, by Rodrigues' formula."""
+    first, second, x, y, z = np.broadcast_arrays(*tilt, *np.asarray(vector))
+    axis, turned = np.array([first, second, np.zeros_like(first)]), np.array([x, y, z])
+    angle = np.hypot(first, second) + TINY
     cosine, sine = cos_sin(angle)
-    return cosine, sine / angle
+    ratio = sine / angle
+    along = (first * x + second * y) * ratio * ratio / (1.0 + cosine)
+    return np.asarray(turned * cosine + np.cross(axis, turned, axis=0) * ratio + axis * along)
 
 
-def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
-    """``vector`` turned by the rotation vector (``tilt``, 0)."""
-    if all(map(nothing, tilt)):
-        return triple(vector)
-    first, second = tilt
-    cosine, ratio = tilted(first, second)
-    # Rodrigues: v cos φ + (u × v) sin φ + u (u·v)(1 - cos φ), with u = tilt/φ and (1 - cos φ)/φ² =
-    # ratio²/(1 + cos φ)
-    along = (first * vector[0] + second * vector[1]) * ratio * ratio / (1.0 + cosine)
-    turned = added(scaled(vector, cosine), scaled(cross((first, second, 0.0), vector), ratio))
-    return added(turned, (first * along, second * along, 0.0))
-
-
-def turned(matrix: Any, vector: Sequence[Cases]) -> Triple:
-    """Matrix (3, 3), or (3, 3, n), times vector, elementwise over cases."""
-    return triple(reduce(plus, map(times, row, vector)) for row in matrix)
+def in_axes(matrix: Array, vector: Array) -> Array:
+    """Matrix (3, 3), or (3, 3, n), times vectors (3, n)."""
+    return np.asarray(np.einsum("ij...,j...->i...", matrix, vector))
 
 
 def tank_of(spacecraft: Spacecraft, draws: Draws) -> Tank | None:
@@ -124,7 +72,7 @@ def tank_of(spacecraft: Spacecraft, draws: Draws) -> Tank | None:
         return None
     names = ("propellant", "pressure", "final_pressure", "exponent")
     changed = {
-        name: plus(getattr(spacecraft.tank, name), draws.get(f"tank {name}", 0.0)) for name in names
+        name: getattr(spacecraft.tank, name) + draws.get(f"tank {name}", 0.0) for name in names
     }
     return replace(spacecraft.tank, **changed)
 
@@ -132,53 +80,10 @@ def tank_of(spacecraft: Spacecraft, draws: Draws) -> Tank | None:
 def cold_of(spacecraft: Spacecraft, draws: Draws) -> Cold | None:
     """Cold nozzles of the cases."""
     cold = spacecraft.cold
-    first = draws.get("cold", 0.0)
-    pulses = draws.get("cold_pulses", 0.0)
-    return cold and replace(cold, first=plus(cold.first, first), pulses=plus(cold.pulses, pulses))
-
-
-def supplied(
-    spacecraft: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
-) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
-    """Strength of each pulse of cases over the planned one, zero once the tank is empty; its
-    propellant, kg, or None.
-
-    ``flows``: propellant of each over that planned, at the same pressure and as warm. The last is
-    the share of the tank that all would take, above 1 where it does not last; 0 without a tank, or
-    where it is not known what they take.
-    """
-    tank = tank_of(spacecraft, draws)
-    priced = all(pulse.propellant is not None for pulse in schedule)
-    taken: list[Cases] = [
-        (pulse.propellant or 0.0) * flow for pulse, flow in zip(schedule, flows, strict=True)
-    ]
-    levels: list[Cases] = [1.0] * len(flows)
-    if tank is None and not ("cold" in draws or "cold_pulses" in draws):
-        return levels, tuple(taken) if priced else None, 0.0
-    nominal, case = (
-        Supply(spacecraft),
-        Supply(replace(spacecraft, cold=cold_of(spacecraft, draws), tank=tank)),
-    )
-    channels = {channel.name: channel for channel in spacecraft.channels}
-    higher: Cases = 1.0  # the file gives the thrust at its own pressure
-    if tank is not None and spacecraft.tank is not None:
-        higher = (tank.pressure / spacecraft.tank.pressure) ** tank.exponent
-    for number in sorted(range(len(flows)), key=lambda at: schedule.pulses[at].loaded[0]):
-        pulse = schedule.pulses[number]
-        channel = channels.get(pulse.channel)
-        if channel is None or pulse.torque is None:
-            nominal.draw(pulse.propellant or 0.0)
-            levels[number] = case.draw(taken[number])
-            taken[number] = taken[number] * levels[number]
-            continue
-        before, _ = nominal.take(channel, pulse.on_time)
-        level, used = case.take(channel, pulse.on_time * flows[number] * higher)
-        levels[number], taken[number] = (
-            level * higher / (before or 1.0),
-            0.0 if used is None else used,
-        )
-    drained = 0.0 if tank is None or not priced else case.used / tank.propellant
-    return levels, tuple(taken) if priced else None, drained
+    if cold is None:
+        return None
+    first, pulses = draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
+    return replace(cold, first=cold.first + first, pulses=cold.pulses + pulses)
 
 
 # rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)
@@ -189,103 +94,64 @@ NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg", "s
 
 POSITIVE = ("sensor_scale", "sensor_noise")  # tolerances of quantities that are not zero either
 
-ROUNDING = 1e-9
-"""A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is
-that channel's.
-"""
-
 
 class Thrusting(NamedTuple):
     """Thrust of one thruster through a dispersed valve: times from the start of the command."""
 
     opened: Opened
-    torque: Triple
+    torque: Array  # (3, n) N m
 
 
 @dataclass(frozen=True, slots=True)
 class DispersedCases:
-    """Dispersed cases, in principal axes and SI; each pulse counts as a rectangle."""
+    """Dispersed cases, in principal axes and SI."""
 
-    moments: Triple  # at t = 0, kg m²
-    omega0: Triple  # rad/s
-    starts: tuple[Cases, ...]  # of each rectangle, s
-    widths: tuple[Cases, ...]  # s
-    leads: tuple[Cases, ...]  # from the command to its start, s
-    impulses: tuple[Triple, ...]  # N m s
+    moments: Array  # at t = 0, (3, n) kg m²
+    omega0: Array  # (3, n) rad/s
+    starts: Array  # of the commands, (k, n) s
+    impulses: Array  # (k, 3, n) N m s
     thrust: tuple[tuple[Thrusting, ...], ...]  # of each pulse where a valve is not as in the file
-    tilt: tuple[
-        Cases, Cases
-    ]  # rotation vector about body axes 1 and 2 by which the attitude at t = 0 is off, rad
-    spent: (
-        tuple[Cases, ...] | None
-    )  # propellant of each pulse, kg; None where that of one is not known
-    drained: Cases = 0.0  # as of `supplied`
-    per_kg: Triple | None = None  # decrease of the moments by each kg, m²; None where they stay
-    wheel: Cases = 0.0  # h, N m s
+    # rotation vector about body axes 1 and 2 by which the attitude at t = 0 is off, (2, n) rad
+    tilt: Array
+    spent: Array | None  # propellant of each pulse, (k, n) kg; None where that of one is not known
+    # share of the tank that all would take, (n,), above 1 where it does not last; 0 without a tank,
+    # or where it is not known what they take
+    drained: Any = 0.0
+    per_kg: Array | None = None  # decrease of the moments by each kg, (3, n) m²; None: they stay
+    wheel: Any = 0.0  # h, N m s
     turn: Any = None  # (3, 3, n): columns are their principal axes, by those of the estimate
 
-    def of_estimate(self, vector: Triple) -> Triple:
-        """A vector in the principal axes of the estimate from the cases' own."""
-        return vector if self.turn is None else turned(self.turn, vector)
+    @property
+    def count(self) -> int:
+        """Number of cases."""
+        return int(self.moments.shape[1])
 
-    def untwisted(self, vector: Triple) -> Triple:
+    def of_estimate(self, vector: Array) -> Array:
+        """A vector in the principal axes of the estimate from the cases' own."""
+        return vector if self.turn is None else in_axes(self.turn, vector)
+
+    def untwisted(self, vector: Array) -> Array:
         """A vector in the cases' own axes, turned about the third to where the first is nearest to
         that of the estimate: small changes of equal moments turn axes by any angle.
         """
         if self.turn is None:
             return vector
         x, y, z = vector
-        cosine, sine = self.turn[:2, 0] / np.sqrt(np.sum(self.turn[:2, 0] ** 2, axis=0))
-        return x * cosine - y * sine, x * sine + y * cosine, z
+        cosine, sine = self.turn[:2, 0] / np.hypot(*self.turn[:2, 0])
+        return np.array([x * cosine - y * sine, x * sine + y * cosine, z])
 
     @property
-    def propellant(self) -> Cases | None:
-        """Total propellant, kg; None where unknown."""
-        return None if self.spent is None else sum(self.spent, 0.0)
-
-    @property
-    def A(self) -> Cases:
-        """Transverse moment of the equivalent symmetric body, kg m²."""
-        first, second, _ = self.moments
-        return first if first is second else 0.5 * (first + second)
-
-    @property
-    def C(self) -> Cases:
-        """Moment about the spin axis, kg m²."""
-        return self.moments[2]
-
-
-@dataclass(frozen=True, slots=True)
-class _Actuation:
-    """Dependence of a pulse on its actuator: on-time at its torque, and the part of the impulse of
-    no thruster.
-    """
-
-    pulse: Pulse
-    source: str | None
-    duration: float
-    remainder: Triple
-
-
-# Response to one pulse at the thrust of the file: start, width, lead, impulse and thrust of
-# `DispersedCases`, and flow.
-_Fired = tuple[Cases, Cases, Cases, Triple, tuple[Thrusting, ...], Cases]
+    def propellant(self) -> Array | None:
+        """Total propellant, (n,) kg; None where unknown."""
+        return None if self.spent is None else self.spent.sum(axis=0)
 
 
 class DispersedModel:
     """Spacecraft and schedule, ready to be dispersed."""
 
     def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
-        self.spacecraft, self.schedule, self.inputs = (
-            spacecraft,
-            schedule,
-            list_inputs(spacecraft, schedule),
-        )
-        self._members = {channel.name: channel.thrusters for channel in spacecraft.channels}
-        if STEERABLE not in self._members and spacecraft.torquer is not None:
-            self._members[STEERABLE] = ()
-        self._actuations = tuple(map(self._actuation, schedule))
-        self._fired_with = schedule.fired_with
+        self.spacecraft, self.schedule = spacecraft, schedule
+        self.inputs = list_inputs(spacecraft, schedule)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -299,7 +165,7 @@ class DispersedModel:
         the same spread.
         """
         return tuple(
-            spread(pulse.command.ramps, pulse.t)
+            action(pulse.command.ramps)[2]
             if pulse.command and pulse.command.ramps
             else pulse.on_time
             for pulse in self.schedule
@@ -324,7 +190,7 @@ class DispersedModel:
         """
         moments, turn = self._body(draws)
         dispersed = "A" in draws or "C" in draws or turn is not None
-        good: Any = _possible(*moments) if dispersed else True
+        good: Any = _rigid(*moments) if dispersed else True
         for entry in self.inputs.drawn:
             if entry.tolerance in NOT_NEGATIVE + POSITIVE and entry.name in draws:
                 value = entry.nominal + draws[entry.name]
@@ -334,234 +200,209 @@ class DispersedModel:
             good = good & possible(tank)
         per_kg = self._per_kg(draws)
         if tank is not None and per_kg is not None:  # with all of it used there must be a body left
-            good = good & _possible(*added(moments, scaled(per_kg, -1.0 * tank.propellant)))
+            good = good & _rigid(*(moments - per_kg * tank.propellant))
         return good  # type: ignore[no-any-return]
 
-    def _per_kg(self, draws: Draws) -> Triple | None:
-        """Decrease of the moments per kg of propellant, m²; None where they stay."""
+    def _per_kg(self, draws: Draws) -> Array | None:
+        """Decrease of the moments per kg of propellant, (3, n) m²; None where they stay."""
         per_kg = shed(self.spacecraft)
-        return (
-            None
-            if per_kg is None
-            else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0)))
-        )
+        factor = np.atleast_1d(1.0 + draws.get("inertia_per_kg", 0.0))
+        return None if per_kg is None else per_kg[:, None] * factor
 
-    def cases(self, draws: Draws) -> DispersedCases:
-        """Cases of the ``draws`` (deviations by input name)."""
-        axes = self.spacecraft.inertia.axes
-        moments, turn = self._body(draws)
-
-        def own(vector: Triple) -> Triple:
-            """In the principal axes of the cases."""
-            return vector if turn is None else turned(np.swapaxes(turn, 0, 1), vector)
-
-        off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
-        torques = {
-            source: self._torque(source, draws)
-            for source in {each.source for each in self._actuations}
-        }
-        fired = [
-            self._fired(n, each, torques[each.source], draws)
-            for n, each in enumerate(self._actuations)
-        ]
-        starts, widths, leads, impulses, thrusts, flows = (
-            zip(*fired, strict=True) if fired else ((),) * 6
-        )
-        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, flows)
-        return DispersedCases(
-            moments=moments,
-            omega0=own(added(parts_of(self.spacecraft.omega0), turned(axes.T, off))),
-            starts=starts,
-            widths=widths,
-            leads=leads,
-            impulses=tuple(own(part) for part in map(scaled, impulses, levels)),
-            thrust=tuple(
-                tuple(Thrusting(each.opened, own(scaled(each.torque, level))) for each in thrust)
-                for thrust, level in zip(thrusts, levels, strict=True)
-            ),
-            tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
-            spent=spent,
-            drained=drained,
-            per_kg=self._per_kg(draws),
-            wheel=plus(self.spacecraft.inertia.wheel, draws.get("wheel momentum", 0.0)),
-            turn=turn,
-        )
-
-    def _fired(
-        self, index: int, actuation: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws
-    ) -> _Fired:
-        """Response to the pulse ``index``; ``nominal`` is the `_torque` of its actuator."""
-        opened = self._opened(actuation, draws)
-        width = self.on_times[index]
-        number = index + 1
-        jitter = draws.get(f"Sun pulse {self._fired_with[index]}", 0.0)
-        late = plus(draws.get("timing offset", 0.0), jitter)
-        shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-        pulse = actuation.pulse
-        start = actuation.pulse.start
-        lead = 0.0
-        fall = 0.0
-        if pulse.command is not None:
-            start, fall = pulse.command.start, pulse.command.fall
-            lead = pulse.t - 0.5 * width - start
-        factor, (torque, mean, flow) = plus(1.0, draws.get(f"thrust pulse {number}", 0.0)), nominal
-        if opened:
-            acts = {thruster.name: each.acts for thruster, each in opened}
-            longer = {name: on_time / pulse.on_time for name, (on_time, _, _) in acts.items()}
-            torque, mean, flow = self._torque(actuation.source, draws, longer)
-            centroid, width = (sum(part[at] for part in acts.values()) / len(acts) for at in (1, 2))
-            lead = centroid - fall * width / 12.0 - 0.5 * width
-        if actuation.source == STEERABLE and not self._members[STEERABLE]:
-            impulse = self._steered(pulse.impulse, mean, draws)
-        else:
-            impulse = added(scaled(torque, actuation.duration), scaled(actuation.remainder, mean))
-        thrust = []
-        for thruster, each in opened:
-            strength = factor * (actuation.duration / pulse.on_time)
-            strength = strength * plus(1.0, draws.get(f"thrust {thruster.name}", 0.0))
-            thrust.append(Thrusting(each, scaled(self.thruster_torque(thruster, draws), strength)))
-        begins = plus(start if nothing(shift) else _not_before(start + shift), lead)
-        return begins, width, lead, scaled(impulse, factor), tuple(thrust), flow * factor
-
-    def _body(self, draws: Draws) -> tuple[Triple, Any]:
-        """Principal moments, and their axes where a tensor is drawn, else None; the draw of A
-        scales both transverse moments, C is the axial one.
+    def _body(self, draws: Draws) -> tuple[Array, Any]:
+        """Principal moments (3, n), and their axes where a tensor is drawn, else None; the draw of
+        A scales both transverse moments, C is the axial one.
         """
         inertia = self.spacecraft.inertia
         if entries := [name for name in TENSOR if name in draws]:
-            count = max(np.size(draws[name]) for name in entries)
-            change = np.zeros((3, 3, count), dtype=np.result_type(*(draws[n] for n in entries)))
+            change = np.zeros((3, 3, max(np.size(draws[name]) for name in entries)))
             for name in entries:
                 row, column = TENSOR[name]
                 change[row, column] = change[column, row] = draws[name]
             turned_back = np.einsum("ki,kln,lj->nij", inertia.axes, change, inertia.axes)
             values, turn = principal(np.diag(inertia.moments), turned_back)
-            return triple(values.T), np.moveaxis(turn, 0, -1)
+            return values.T, np.moveaxis(turn, 0, -1)
+        transverse = 1.0 + draws.get("A", 0.0) / inertia.A
         first, second, third = inertia.moments
-        transverse = plus(1.0, times(draws.get("A", 0.0), 1.0 / inertia.A))
-        wider = first * transverse
-        other = wider if first == second else second * transverse
-        return (wider, other, plus(third, draws.get("C", 0.0))), None
+        parts = (first * transverse, second * transverse, third + draws.get("C", 0.0))
+        return np.array(np.broadcast_arrays(*map(np.atleast_1d, parts))), None
 
-    def _actuation(self, pulse: Pulse) -> _Actuation:
-        thrusters = self._members.get(pulse.channel)
-        source = None if thrusters is None else pulse.channel
-        if not thrusters:
-            return _Actuation(pulse, source, pulse.on_time, parts_of(pulse.impulse))
-        torque = np.sum([thruster.torque for thruster in thrusters], axis=0)
-        duration = pulse.on_time or float(np.linalg.norm(pulse.impulse) / np.linalg.norm(torque))
-        if (
-            pulse.torque is not None and self.spacecraft.thrust_laws
-        ):  # weaker where it is cold or the pressure falls
-            duration *= float(torque @ pulse.torque) / float(torque @ torque)
-        remainder = pulse.impulse - duration * torque
-        if np.linalg.norm(remainder) <= ROUNDING * np.linalg.norm(pulse.impulse):
-            # What is left is rounding; a single thruster takes it, so that its direction is exactly
-            # the schedule's.
-            remainder = np.zeros(3)
-        return _Actuation(pulse, source, duration, parts_of(remainder))
+    def cases(self, draws: Draws) -> DispersedCases:
+        """Cases of the ``draws`` (deviations by input name)."""
+        spacecraft, pulses = self.spacecraft, self.schedule.pulses
+        count = max(map(np.size, draws.values()), default=1)
+        moments, turn = self._body(draws)
+        per_kg = self._per_kg(draws)
 
-    def _opened(self, actuation: _Actuation, draws: Draws) -> list[tuple[Thruster, Opened]]:
-        """Thrusters of a pulse with the response of their valves,
-        where any of these is dispersed.
+        def own(vector: Array) -> Array:
+            """In the principal axes of the cases."""
+            return vector if turn is None else in_axes(np.swapaxes(turn, 0, 1), vector)
+
+        def whole(values: Any) -> Array:
+            """Values (..., n) of all cases, by those (..., 1) or (..., n)."""
+            return np.array(np.broadcast_to(values, (*np.shape(values)[:-1], count)))
+
+        off = vector_of(draws, [f"omega0_{axis}" for axis in (1, 2, 3)])
+        rates = spacecraft.omega0[:, None] + in_axes(spacecraft.inertia.axes.T, off)
+        fired = [self._fired(number, draws) for number in range(len(pulses))]
+        levels, spent, drained = self._supplied(draws, [flow for _, _, flow in fired])
+        impulses, starts = np.empty((len(pulses), 3, count)), np.empty((len(pulses), count))
+        thrust = []
+        late = draws.get("timing offset", 0.0)
+        for number, ((impulse, through, _), level) in enumerate(zip(fired, levels, strict=True)):
+            impulses[number] = own(whole(impulse * level))
+            thrust.append(tuple(each._replace(torque=own(each.torque * level)) for each in through))
+            jitter = draws.get(f"Sun pulse {self.schedule.fired_with[number]}", 0.0)
+            shift = late + jitter + draws.get(f"timing pulse {number + 1}", 0.0)
+            starts[number] = np.maximum(pulses[number].loaded[0] + shift, 0.0)
+        return DispersedCases(
+            moments=whole(moments),
+            omega0=own(whole(rates)),
+            starts=starts,
+            impulses=impulses,
+            thrust=tuple(thrust),
+            tilt=whole(vector_of(draws, ("attitude x", "attitude y"))),
+            spent=None if spent is None else np.array([whole(each) for each in spent]),
+            drained=drained,
+            per_kg=None if per_kg is None else whole(per_kg),
+            wheel=spacecraft.inertia.wheel + draws.get("wheel momentum", 0.0),
+            turn=turn,
+        )
+
+    def _fired(self, number: int, draws: Draws) -> tuple[Any, tuple[Thrusting, ...], Any]:
+        """Response to a pulse at the thrust of the file: its impulse (3, n), the thrust of each
+        thruster where a valve is dispersed, and its propellant over the planned one.
         """
-        if (
-            actuation.pulse.command is None
-            or actuation.source is None
-            or not actuation.pulse.command.ramps
-        ):
-            return []
-        members = self._members[actuation.source]
-        on_time = actuation.pulse.command.on_time
-        if not any(f"{key} {thruster.name}" in draws for thruster in members for key in BY_VALVE):
-            return []
-        openings = list[tuple[Thruster, Opened]]()
-        for thruster in members:
+        pulse = self.schedule.pulses[number]
+        factor = 1.0 + draws.get(f"thrust pulse {number + 1}", 0.0)
+        thrusters = next(
+            (each.thrusters for each in self.spacecraft.channels if each.name == pulse.channel), ()
+        )
+        if not thrusters:
+            impulse = np.array(pulse.impulse[:, None])
+            if pulse.channel == STEERABLE and self.spacecraft.torquer is not None:
+                cosine, sine = cos_sin(np.atleast_1d(draws.get(f"direction {STEERABLE}", 0.0)))
+                x, y, z = impulse
+                impulse = np.array([x * cosine - y * sine, x * sine + y * cosine, z + 0.0 * cosine])
+                factor = factor * (1.0 + draws.get(f"thrust {STEERABLE}", 0.0))
+            return impulse * factor, (), factor
+        nominal = np.sum([thruster.torque for thruster in thrusters], axis=0)
+        duration = pulse.on_time or float(np.linalg.norm(pulse.impulse) / np.linalg.norm(nominal))
+        if pulse.torque is not None and self.spacecraft.thrust_laws:
+            # weaker where it is cold or the pressure falls
+            duration *= float(nominal @ pulse.torque) / float(nominal @ nominal)
+        opened = self._opened(pulse, thrusters, draws)
+        torque, factors, through = np.zeros((3, 1)), list[Any](), list[Thrusting]()
+        for thruster in thrusters:
+            strength = 1.0 + draws.get(f"thrust {thruster.name}", 0.0)
+            own = self.thruster_torque(thruster, draws)
+            if thruster.name in opened:
+                valve = opened[thruster.name]
+                part = own * (factor * strength * (duration / pulse.on_time))
+                through.append(Thrusting(valve, part))
+                strength = strength * valve.acts[0] / pulse.on_time
+            factors.append(strength)
+            torque = torque + own * strength
+        flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
+        flow = sum(weight * each for weight, each in zip(flows, factors, strict=True))
+        # what its thrusters do not explain is as much stronger as these are on average
+        remainder = (pulse.impulse - duration * nominal)[:, None] * (sum(factors) / len(factors))
+        impulse = (torque * duration + remainder) * factor
+        return impulse, tuple(through), flow / math.fsum(flows) * factor
+
+    def _supplied(
+        self, draws: Draws, flows: Sequence[Any]
+    ) -> tuple[list[Any], list[Any] | None, Any]:
+        """Strength of each pulse over the planned one, zero once the tank is empty; its propellant,
+        kg, or None; and `DispersedCases.drained`.
+
+        ``flows``: propellant of each over that planned, at the same pressure and as warm.
+        """
+        spacecraft, pulses = self.spacecraft, self.schedule.pulses
+        tank = tank_of(spacecraft, draws)
+        priced = all(pulse.propellant is not None for pulse in pulses)
+        taken = [
+            (pulse.propellant or 0.0) * flow for pulse, flow in zip(pulses, flows, strict=True)
+        ]
+        levels: list[Any] = [1.0] * len(flows)
+        if tank is None and not ("cold" in draws or "cold_pulses" in draws):
+            return levels, taken if priced else None, 0.0
+        nominal = Supply(spacecraft)
+        case = Supply(replace(spacecraft, cold=cold_of(spacecraft, draws), tank=tank))
+        channels = {channel.name: channel for channel in spacecraft.channels}
+        higher: Any = 1.0  # the file gives the thrust at its own pressure
+        if tank is not None and spacecraft.tank is not None:
+            higher = (tank.pressure / spacecraft.tank.pressure) ** tank.exponent
+        for number in sorted(range(len(flows)), key=lambda at: pulses[at].loaded[0]):
+            pulse = pulses[number]
+            channel = channels.get(pulse.channel)
+            if channel is None or pulse.torque is None:
+                nominal.draw(pulse.propellant or 0.0)
+                levels[number] = case.draw(taken[number])
+                taken[number] = taken[number] * levels[number]
+                continue
+            before, _ = nominal.take(channel, pulse.on_time)
+            level, used = case.take(channel, pulse.on_time * flows[number] * higher)
+            levels[number] = level * higher / (before or 1.0)
+            taken[number] = 0.0 if used is None else used
+        drained = 0.0 if tank is None or not priced else case.used / tank.propellant
+        return levels, taken if priced else None, drained
+
+    def _opened(
+        self, pulse: Pulse, thrusters: Sequence[Thruster], draws: Draws
+    ) -> Mapping[str, Opened]:
+        """Response of the valves of a pulse by thruster, where any of them is dispersed."""
+        dispersed = any(f"{key} {each.name}" in draws for each in thrusters for key in BY_VALVE)
+        if pulse.command is None or not pulse.command.ramps or not dispersed:
+            return {}
+        responses = {}
+        for thruster in thrusters:
             off = [draws.get(f"{key} {thruster.name}", 0.0) for key in BY_VALVE]
             if isinstance(thruster.valve, Trapezoid):
-                openings.append((thruster, thruster.valve.opened(on_time, *off[:-1])))
+                opened = thruster.valve.opened(pulse.command.on_time, *off[:-1])
             elif isinstance(thruster.valve, Measured):
-                openings.append((thruster, thruster.valve.opened(on_time, plus(1.0, off[-1]))))
-        return openings
+                opened = thruster.valve.opened(pulse.command.on_time, 1.0 + off[-1])
+            responses[thruster.name] = opened
+        return responses
 
-    def _torque(
-        self, source: str | None, draws: Draws, longer: Mapping[str, Cases] | None = None
-    ) -> tuple[Triple, Cases, Cases]:
-        """Torque of a channel (N m), the mean thrust factor of its thrusters, and that of their
-        propellant flow.
+    def thruster_torque(self, thruster: Thruster, draws: Draws) -> Array:
+        """Torque at nominal thrust, with the force tilted and its point of attack moved, (3, n)
+        N m, or (3, 1) where neither is drawn.
         """
-        thrusters = self._members.get(source, ()) if source is not None else ()
-        if not thrusters:
-            factor = 1.0 if source is None else plus(1.0, draws.get(f"thrust {STEERABLE}", 0.0))
-            return (0.0, 0.0, 0.0), factor, factor
-        torque: Triple = (0.0, 0.0, 0.0)
-        factors = [plus(1.0, draws.get(f"thrust {thruster.name}", 0.0)) for thruster in thrusters]
-        if longer:
-            factors = [
-                factor * longer.get(each.name, 1.0)
-                for factor, each in zip(factors, thrusters, strict=True)
-            ]
-        for thruster, factor in zip(thrusters, factors, strict=True):
-            torque = added(torque, scaled(self.thruster_torque(thruster, draws), factor))
-        flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
-        flow = sum(
-            weight * factor for weight, factor in zip(flows, factors, strict=True)
-        ) / math.fsum(flows)
-        return torque, sum(factors) / len(factors), flow
-
-    def thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
-        """Torque at nominal thrust, with the force tilted and its point of attack moved, N m."""
-        tilts = [draws.get(f"direction {thruster.name} {axis}", 0.0) for axis in "ab"]
-        positions = [draws.get(f"position {thruster.name} {axis}", 0.0) for axis in "xyz"]
-        centers = [draws.get(f"center of mass {axis}", 0.0) for axis in "xyz"]
-        moves = added(positions, scaled(centers, -1.0))
-        leans, moved = not all(map(nothing, tilts)), not all(map(nothing, moves))
-        torque = parts_of(thruster.torque)
-        if thruster.force is None or not (leans or moved):
+        tilts = [f"direction {thruster.name} {axis}" for axis in "ab"]
+        positions = [f"position {thruster.name} {axis}" for axis in "xyz"]
+        centers = [f"center of mass {axis}" for axis in "xyz"]
+        torque = np.array(thruster.torque[:, None])
+        if thruster.force is None or not {*tilts, *positions, *centers} & {*draws}:
             return torque
-        force = parts_of(thruster.force)
-        if leans and thruster.position is not None:
-            cosine, ratio = tilted(*tilts)
-            torque, force = scaled(torque, cosine), scaled(force, cosine)
-            for axis, tilt in zip(tilt_axes(thruster.force), tilts, strict=True):
-                more = parts_of(np.cross(axis, thruster.force))
-                lean = times(tilt, ratio)
-                torque = added(torque, scaled(cross(parts_of(thruster.position), more), lean))
-                force = added(force, scaled(more, lean))
-        if moved:
-            torque = added(torque, cross(turned(self.spacecraft.inertia.axes.T, moves), force))
-        return torque
-
-    def _steered(self, impulse: Vector, factor: Cases, draws: Draws) -> Triple:
-        """Impulse of the steerable torquer, its axis turned in the 1-2 plane."""
-        x, y, z = scaled(parts_of(impulse), factor)
-        angle = draws.get(f"direction {STEERABLE}", 0.0)
-        if nothing(angle):
-            return x, y, z
-        cosine, sine = cos_sin(angle)
-        return x * cosine - y * sine, x * sine + y * cosine, z
+        force = np.array(thruster.force[:, None])
+        if thruster.position is not None:
+            first, second = vector_of(draws, tilts)
+            angle = np.hypot(first, second) + TINY
+            cosine, sine = cos_sin(angle)
+            torque, force = torque * cosine, force * cosine
+            for axis, tilt in zip(tilt_axes(thruster.force), (first, second), strict=True):
+                more, lean = np.cross(axis, thruster.force), tilt * sine / angle
+                torque = torque + np.cross(thruster.position, more)[:, None] * lean
+                force = force + more[:, None] * lean
+        moves = vector_of(draws, positions) - vector_of(draws, centers)
+        arm = in_axes(self.spacecraft.inertia.axes.T, moves)
+        arm, force = np.broadcast_arrays(arm, force)
+        return np.asarray(torque + np.cross(arm, force, axis=0))
 
 
-def _possible(first: Cases, second: Cases, third: Cases) -> Any:
+def _rigid(first: Array, second: Array, third: Array) -> Any:
+    """True where a rigid body has these moments."""
     slack = 1.0 + DISC
     good = (first > 0.0) & (second > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
     return good & (first <= (second + third) * slack) & (second <= (first + third) * slack)
 
 
-def _not_before(start: Cases) -> Cases:
-    """Starts not before t = 0; at 0 the derivative is the mean of both sides, one half."""
-    if not np.iscomplexobj(start):
-        return np.maximum(start, 0.0)
-    return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
-
-
-def principal(tensor: Vector, change: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+def principal(tensor: Vector, change: Array) -> tuple[Array, Array]:
     """Moments (n, 3) of a ``tensor`` (3, 3) with changes (n, 3, 3), and the turns (n, 3, 3) whose
     columns are the axes: right-handed, the third the nearest to the third, then the first.
-
-    An imaginary part is a change to first order; of equal moments it turns no axis.
     """
-    values, vectors = np.linalg.eigh(tensor + change.real)
+    values, vectors = np.linalg.eigh(tensor + change)
     nearness = np.abs(vectors)
     third = np.argmax(nearness[:, 2], axis=1)
     nearness[np.arange(len(values)), 0, third] = -1.0
@@ -571,18 +412,10 @@ def principal(tensor: Vector, change: NDArray[Any]) -> tuple[NDArray[Any], NDArr
     turn = np.take_along_axis(vectors, order[:, None, :], axis=2)
     turn *= np.where(np.diagonal(turn, axis1=1, axis2=2) < 0.0, -1.0, 1.0)[:, None, :]
     turn[:, :, 1] = np.cross(turn[:, :, 2], turn[:, :, 0])
-    if not np.iscomplexobj(change):
-        return values, turn
-    slight = np.swapaxes(turn, 1, 2) @ change.imag @ turn
-    apart = values[:, None, :] - values[:, :, None]
-    equal = np.abs(apart) <= DEGENERATE * values.max(axis=1)[:, None, None]
-    lean = slight / np.where(equal, np.inf, apart)
-    return values + 1j * np.diagonal(slight, axis1=1, axis2=2), turn + 1j * turn @ lean
+    return values, turn
 
 
-def watch_over(
-    spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int, turn: Any = None
-) -> AxisWatch:
+def watch_over(spacecraft: Spacecraft, tilt: Any, count: int, turn: Any = None) -> AxisWatch:
     """Observer of ``count`` cases with axes off by a ``tilt``, rad, about 1 and 2, and by the
     ``turn`` of `DispersedCases`.
     """
@@ -599,27 +432,12 @@ def watch_over(
 
 
 def in_body(
-    spacecraft: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector, turn: Any = None
-) -> NDArray[np.float64]:
+    spacecraft: Spacecraft, tilt: Any, count: int, direction: Vector, turn: Any = None
+) -> Array:
     """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt`` and a
     ``turn``, (3, n).
     """
-    x, y, z = attitude.rotate(attitude.conjugate(spacecraft.initial.quaternion), direction).tolist()
-    seen = rotated((x, y, z), (-tilt[0], -tilt[1]))
-    own = seen if turn is None else turned(np.swapaxes(turn, 0, 1), seen)
-    return np.array([np.broadcast_to(part, count) for part in own])
-
-
-def number_of(cases: DispersedCases) -> int:
-    """Number of cases."""
-    parts = (
-        *cases.moments,
-        *cases.omega0,
-        *cases.starts,
-        *cases.tilt,
-        *(cases.spent or ()),
-        *(cases.per_kg or ()),
-    )
-    return max(
-        np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse))
-    )
+    known = attitude.rotate(attitude.conjugate(spacecraft.initial.quaternion), direction)
+    seen = rotated(known, (-tilt[0], -tilt[1])).reshape(3, -1)
+    own = seen if turn is None else in_axes(np.swapaxes(turn, 0, 1), seen)
+    return np.array(np.broadcast_to(own, (3, count)))

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
@@ -480,7 +479,7 @@ MOST_ATTEMPTS = (
 
 
 class DrawSource:
-    """Draws of the blocks of a study by one thread; ``physical`` tells which cases can be, (n,) or
+    """Draws of the blocks of a study; ``physical`` tells which cases can be, (n,) or
     True for all.
     """
 
@@ -545,20 +544,10 @@ class DrawSource:
 # draws
 KEPT = 128
 
-_DRAWING = threading.Lock()
-
-
-def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
-    """First ``count`` draws of an input, of size one; by the thread that comes first where several
-    want the same.
-    """
-    with _DRAWING:
-        return _stream(name, kind, seed, block, attempt, count)
-
 
 @lru_cache(KEPT)
-def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
-    """Read-only draws of `_drawn`."""
+def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
+    """First ``count`` draws of an input, of size one; read-only."""
     stream = int.from_bytes(
         hashlib.blake2b(name.encode(), digest_size=8).digest(), "little"
     )  # the same everywhere

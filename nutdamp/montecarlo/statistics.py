@@ -8,15 +8,13 @@ input (the correlation ratio, Pearson 1905).
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Triple, parts_of
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
 from nutdamp.montecarlo.propagated import Ends
 from nutdamp.physics.attitude import angle_of_parts
@@ -71,42 +69,37 @@ ROWS = 11  # rows of `vectors`
 def measure(model: DispersedModel, ends: Ends, count: int) -> Array:
     """The `OUTPUTS` (5, n) of ``count`` cases; propellant is NaN where unknown."""
     x, y, z = ends.momentum
+    nutation = np.arctan2(np.hypot(x, y), model.spacecraft.sense * z)
     rows = (
-        np.arctan2(np.sqrt(x * x + y * y), model.spacecraft.sense * z)
-        if ends.nutation is None
-        else ends.nutation,
+        nutation if ends.nutation is None else ends.nutation,
         angle_of_parts(ends.before, ends.after),
-        angle_of_parts(parts_of(model.target), ends.pointed),
+        angle_of_parts(model.target, ends.pointed),
         ends.spin_change,
         np.nan if ends.propellant is None else ends.propellant,
     )
     return np.array([np.broadcast_to(row, count) for row in rows])
 
 
-def vectors(model: DispersedModel, ends: Ends, count: int) -> NDArray[Any]:
+def vectors(model: DispersedModel, ends: Ends, count: int) -> Array:
     """Quantities (11, n) of ``count`` cases that are linear for small dispersions; `VECTORS` names
     the rows.
 
     Nutation is the transverse momentum over the axial one, the momentum shift the change of its
     direction, the axis error that direction less the target, in the body axes of t = 0.
     """
-    x, y, z = ends.momentum
-    before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
+    before, after, pointed = (
+        vector / np.linalg.norm(vector, axis=0)
+        for vector in (ends.before, ends.after, ends.pointed)
+    )
     rows = (
-        *(across * model.spacecraft.sense / z for across in (x, y)),
-        *map(operator.sub, after, before),
-        *map(operator.sub, pointed, model.target),
+        *(ends.momentum[:2] * model.spacecraft.sense / ends.momentum[2]),
+        *(after - before),
+        *(pointed - model.target[:, None]),
         ends.spin_change,
         0.0 if ends.propellant is None else ends.propellant,
         ends.spin,
     )
     return np.array([np.broadcast_to(row, count) for row in rows])
-
-
-def _unit(vector: Triple) -> Triple:
-    x, y, z = vector
-    size = 1.0 / np.sqrt(x * x + y * y + z * z)
-    return x * size, y * size, z * size
 
 
 EXACT_CASES = (
@@ -281,18 +274,25 @@ def first_order(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) ->
     differences: each input in turn is off by a step of either sign.
     """
     inputs = model.inputs.drawn
-    steps = np.array([SHARE * abs(entry.size) for entry in inputs])
     if not inputs:
         return FirstOrder(inputs, np.empty((ROWS, 0)), model.groups)
-    draws = {}
-    for index, entry in enumerate(inputs):
-        draw = np.zeros(2 * len(inputs))
-        draw[2 * index : 2 * index + 2] = steps[index], -steps[index]
-        draws[entry.name] = draw + (entry.size if entry.kind == "bias" else 0.0)
+    draws, steps = stepped(inputs)
     out = vectors(model, fly(model.cases(draws)), 2 * len(inputs))
     apart = out[:, ::2] - out[:, 1::2]
     apart[np.abs(apart) < ROUNDING] = 0.0
     return FirstOrder(inputs, 0.5 * apart / steps, model.groups)
+
+
+def stepped(inputs: Sequence[DispersedInput]) -> tuple[dict[str, Array], Array]:
+    """Draws (2 d,) about nominal values and biases for central differences: each of d inputs in
+    turn is off by a step up, then down; and the steps (d,), in the units of the inputs.
+    """
+    steps = np.array([SHARE * abs(entry.size) for entry in inputs])
+    draws = {}
+    for index, entry in enumerate(inputs):
+        draws[entry.name] = np.full(2 * len(inputs), entry.size if entry.kind == "bias" else 0.0)
+        draws[entry.name][2 * index : 2 * index + 2] += steps[index], -steps[index]
+    return draws, steps
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:

@@ -1,4 +1,4 @@
-"""Dispersion studies: many dispersed cases fly one schedule, in rounds, so that a study can be
+"""Dispersion studies: many dispersed cases fly one schedule, some at a time, so that a study can be
 watched and stopped.
 """
 
@@ -8,7 +8,7 @@ import math
 import os
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -63,95 +63,9 @@ from nutdamp.spacecraft.tolerances import expect_dispersions
 
 Array = NDArray[np.float64]
 
-STRIDE = motion.BLOCK  # cases that are always flown together
-PORTION = 2 * STRIDE  # cases that a thread takes at once; blocks are multiples of it
+STRIDE = motion.BLOCK  # cases that are always flown together; blocks of draws are multiples of it
 
-
-class Round:
-    """Some cases of a study, flown by several threads that take one portion of a block of draws
-    after the other.
-    """
-
-    def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
-        self.results, self.first, self.last, self.out = results, first, last, out
-        self.severity, self.emptied = np.empty(last - first), np.zeros(last - first, dtype=bool)
-        self.portions = range(first // PORTION, math.ceil(last / PORTION))
-        self.left = iter(self.portions)
-        self.flown = self.redrawn = 0  # cases
-        self.failures: list[BaseException] = []
-        self.lock = threading.Lock()
-
-    def fly(
-        self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]
-    ) -> tuple[int, int]:
-        """Fly the round; returns the number of flown cases, always the first ones,
-        and of redraws.
-        """
-        count = min(threads, len(self.portions))
-        # Daemons: an interrupt need not wait for the portions that are in work, which nobody uses
-        # then.
-        workers = [
-            threading.Thread(target=self._work, args=(stopped,), daemon=True) for _ in range(count)
-        ]
-        for worker in workers:
-            worker.start()
-        try:
-            for worker in workers:
-                while worker.is_alive():
-                    worker.join(0.1)
-                    if worker.is_alive():
-                        watch(self.first + self.flown)
-        except BaseException:
-            self.left = iter(())  # nothing more is begun
-            raise
-        if self.failures:
-            raise self.failures[0]
-        return self.flown, self.redrawn
-
-    def _work(self, stopped: Callable[[], bool]) -> None:
-        try:
-            source = self.results.study.source()
-            block = -1
-            while not stopped():
-                with self.lock:
-                    portion = next(self.left, None)
-                if portion is None:
-                    return
-                begin = max(self.first, portion * PORTION)
-                end = min(self.last, (portion + 1) * PORTION)
-                if begin // BLOCK != block:
-                    block = begin // BLOCK
-                    drawn = source.block(block)
-                redrawn = self._fly(drawn, block * BLOCK, begin, end)
-                with self.lock:
-                    self.flown += end - begin
-                    self.redrawn += redrawn
-        except BaseException as failure:  # handed to the thread that waits
-            self.failures.append(failure)
-            self.left = iter(())
-
-    def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
-        """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number
-        of redraws.
-        """
-        study, early, (draws, redrawn) = self.results.study, self.results.early, drawn
-        # Whole strides are flown, even for fewer cases: what flies them may let one depend on its
-        # stride.
-        low = begin - begin % STRIDE
-        high = end + -end % STRIDE
-        ends = study.flies(study.model.cases(some_of(draws, slice(low - start, high - start))))
-        values = study.values(ends, high - low)
-        inner, place = slice(begin - low, end - low), slice(begin - self.first, end - self.first)
-        self.out[:, place] = values[:, inner]
-        self.severity[place] = study.severity(values, ends.drained)[inner]
-        self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
-        if low < early.shape[1]:
-            early[:, begin:end] = vectors(study.model, ends, high - low)[:, inner]
-        return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))
-
-
-ROUND = 64 * BLOCK  # cases between two looks at the results
-FREED = 32_000_000  # bytes of the largest block that counts for that
+FREED = 32_000_000  # bytes of the largest block that the C library counts for what it keeps
 EARLY = 2 * BLOCK  # number of first cases whose outcome is kept whole for `sampled_shares`
 KEPT_WORST = 1_000  # worst cases that are kept
 
@@ -228,6 +142,9 @@ class DrawnCases:
         }
 
 
+Flown = tuple[Array, Array, NDArray[np.bool_], Array]  # see `Study.flown`
+
+
 @dataclass(frozen=True, eq=False)
 class Study(DrawnCases):
     """Study: cases of ``model`` drawn from ``seed``."""
@@ -244,6 +161,16 @@ class Study(DrawnCases):
     def first_order(self) -> FirstOrder:
         """Sensitivities of the flight."""
         return first_order(self.model, self.flies)
+
+    def flown(self, draws: Draws) -> Flown:
+        """A stride of cases of these draws: their `values`, `severity` (n,), whether the tank runs
+        empty (n,), and `vectors`.
+        """
+        ends = self.flies(self.model.cases(draws))
+        values = self.values(ends, STRIDE)
+        severity = np.broadcast_to(self.severity(values, ends.drained), STRIDE)
+        emptied = np.broadcast_to(np.asarray(ends.drained) > 1.0, STRIDE)
+        return values, severity, emptied, vectors(self.model, ends, STRIDE)
 
     def ends_of(self, draws: Draws) -> Ends:
         """End state of one case with these deviations; none: of the estimate itself."""
@@ -528,11 +455,18 @@ class Results(Counted):
             each = correlated_shares(self._early_draws(), values)
         return by_tolerance(first.inputs, groups, each)
 
-    def take(self, values: Array, severity: Array, emptied: NDArray[np.bool_]) -> None:
+    def take(
+        self, values: Array, severity: Array, emptied: NDArray[np.bool_], linear: Array
+    ) -> None:
         """Count further cases by their ``values``, see `count`; ``emptied`` (n,): whose tank runs
-        empty.
+        empty; ``linear``: their `vectors`.
         """
         self.emptied += int(np.count_nonzero(emptied))
+        rows = slice(self.done, self.done + len(severity))
+        if self.done < EARLY:
+            self.early[:, rows] = linear
+        if self.values is not None:
+            self.values[:, rows] = values
         for sketch, row in zip(self.sketches, values, strict=False):
             sketch.add(row)
         self.count(severity, self.study.left(values), ~emptied)
@@ -562,28 +496,65 @@ def run(
     ``watch`` is called now and then with how many are done; they are kept when ``stopped`` says so.
     ``collect`` is given the number (from 0) of the first of some cases, and their `Results.values`,
     in order.
+
+    Block after block of draws; whole strides are flown, even for fewer cases: what flies them may
+    let one depend on its stride.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride
     # asks for new pages.
     np.empty(FREED, dtype=np.uint8)
+    study, source = results.study, results.study.source()
     while results.done < results.requested and not stopped():
         first = results.done
-        last = min(results.requested, first - first % ROUND + ROUND)
-        out = (
-            np.empty((results.rows, last - first))
-            if results.values is None
-            else results.values[:, first:last]
-        )
-        flights = Round(results, first, last, out)
-        done, redrawn = flights.fly(threads, watch, stopped)
-        if done == 0:
-            break
-        results.redrawn += redrawn
-        results.take(out[:, :done], flights.severity[:done], flights.emptied[:done])
+        block = first - first % BLOCK
+        last = min(results.requested, block + BLOCK)
+        draws, redrawn = source.block(block // BLOCK)
+        strides = range(first - first % STRIDE, last, STRIDE)
+        drawn = [some_of(draws, slice(begin - block, begin - block + STRIDE)) for begin in strides]
+        parts = []
+        flights = _by_threads(study.flown, drawn, threads)
+        for begin, (values, severity, emptied, linear) in zip(strides, flights, strict=True):
+            inner = slice(results.done - begin, min(last - begin, STRIDE))
+            parts.append(values[:, inner])
+            results.take(parts[-1], severity[inner], emptied[inner], linear[:, inner])
+            watch(results.done)
+            if stopped():
+                break
+        redone = (redrawn >= first - block) & (redrawn < results.done - block)
+        results.redrawn += int(np.count_nonzero(redone))
         if collect is not None:
-            collect(first, out[:, :done])
-        watch(results.done)
+            collect(first, np.concatenate(parts, axis=1))
     return results
+
+
+def _by_threads(
+    fly: Callable[[Draws], Flown], drawn: Sequence[Draws], threads: int
+) -> Iterator[Flown]:
+    """Results of ``fly`` for each of the ``drawn``, in order, by several threads at a time."""
+    flights: list[Any] = [None] * len(drawn)
+    landed = [threading.Event() for _ in drawn]
+    remaining = iter(range(len(drawn)))
+
+    def work() -> None:
+        for number in remaining:
+            try:
+                flights[number] = fly(drawn[number])
+            except BaseException as failure:  # handed to the thread that waits
+                flights[number] = failure
+            landed[number].set()
+
+    try:
+        # Daemons: an interrupt need not wait for the flights in work, which nobody uses then.
+        for _ in range(min(threads, len(drawn))):
+            threading.Thread(target=work, daemon=True).start()
+        for number, event in enumerate(landed):
+            event.wait()
+            if isinstance(flights[number], BaseException):
+                raise flights[number]
+            yield flights[number]
+    finally:
+        for _ in remaining:  # nothing more is begun
+            pass
 
 
 def effort(study: Study, samples: int) -> float:

@@ -6,28 +6,22 @@ The name of its class is that of the macro of the templates that shows a block.
 from __future__ import annotations
 
 import base64
-import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
-
 from nutdamp.errors import BadRequest
 from nutdamp.planning.verdict import Line
-from nutdamp.views.tables import DataTable, FittedColumns, Heading, Shared
+from nutdamp.views.tables import DataTable, Heading
 from nutdamp.views.text import sentence
 
 
 class Sheet(NamedTuple):
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``bars``: names of columns in which a bar shows each
-    percentage; ``folds``: on a phone each row is a list of its own.
+    ``mark`` is the row to stand out; ``folds``: on a phone each row is a list of its own.
     """
 
     title: str
@@ -35,7 +29,6 @@ class Sheet(NamedTuple):
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
     folds: bool = False
-    bars: tuple[str, ...] = ()
 
 
 class FactList(NamedTuple):
@@ -125,14 +118,14 @@ class Control(NamedTuple):
     date: str = ""
 
     @property
-    def line(self) -> str:
-        """The entries but for the title, on one line."""
-        return " · ".join(filter(None, (self.number, self.author, self.date)))
-
-    @property
     def number(self) -> str:
         """Number of the document and its issue."""
         return " ".join(filter(None, (self.document, self.issue and f"iss {self.issue}")))
+
+    @property
+    def line(self) -> str:
+        """The entries but for the title, on one line."""
+        return " · ".join(filter(None, (self.number, self.author, self.date)))
 
 
 def controlled(**entries: str) -> Control:
@@ -204,70 +197,17 @@ class Page:
 
 def sheet(table: DataTable, place: str = "page", **look: Any) -> Sheet:
     """A declared table as a `Sheet` with further fields of its ``look``."""
-    return Sheet(table.title, table.headings(place), table.cells(place), table.mark, **look)
-
-
-def sheet_of(title: str, table: Table) -> Sheet:
-    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
-    ranks = table.ranks if isinstance(table, FittedColumns) else (0,) * len(table.columns)
-    columns = []
-    for column, rank in zip(table.columns, ranks, strict=True):
-        name, _, unit = plain(column.header).partition("\n")
-        columns.append(Heading(name, unit, column.justify == "right", rank))
-    first = columns[0]
+    first, *rest = table.headings(place)
     named = first._replace(name=first.name or "quantity")
-    return Sheet(title, (named, *columns[1:]), _rows(table), bars=(Shared.LINEAR, Shared.CASES))
+    return Sheet(table.title, (named, *rest), table.cells(place), table.mark)._replace(**look)
 
 
-def facts_of(title: str, table: Table) -> FactList:
-    """A screen's list of names and values as `FactList`; a row without a name continues the one
-    before.
-    """
+def fact_list(title: str, named: Iterable[tuple[str, str]]) -> FactList:
+    """Names and values as `FactList`; a value without a name continues the one before."""
     rows: list[tuple[str, str]] = []
-    for name, value in _rows(table):
+    for name, value in named:
         if name or not rows:
             rows.append((name, value))
         else:
             rows[-1] = (rows[-1][0], f"{rows[-1][1]}; {value}")
     return FactList(title, tuple(rows))
-
-
-def blocks_of(title: str, screen: RenderableType) -> Iterator[Block]:
-    """Blocks of a screen: a line straight above a table is its title, else ``title`` is."""
-    above = ""
-    for part in _parts(screen):
-        if isinstance(part, Table):
-            maker = sheet_of if part.show_header else facts_of
-            yield maker(above or title, part)
-        elif above:
-            yield Prose(above)
-        above = "" if isinstance(part, Table) else plain(part)
-    if above:
-        yield Prose(above)
-
-
-def _parts(screen: RenderableType) -> Iterator[RenderableType]:
-    """Tables and texts of a screen, groups within it resolved."""
-    if isinstance(screen, Group):
-        for part in screen.renderables:
-            yield from _parts(part)
-    else:
-        yield screen
-
-
-def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
-    return tuple(zip(*(map(plain, column.cells) for column in table.columns), strict=True))
-
-
-def plain(cell: object) -> str:
-    """The text of a cell, which in the tables of the screens is a text with or without a style."""
-    return cell.plain if isinstance(cell, Text) else str(cell)
-
-
-def number_in(text: str) -> float | None:
-    """The number in a cell, 0 for "< 1e-9"; None where it is not known or a word."""
-    try:
-        value = 0.0 if text.startswith("<") else float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None

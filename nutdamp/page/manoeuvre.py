@@ -10,8 +10,6 @@ from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from nutdamp.common.results import note
 from nutdamp.page import document
 from nutdamp.page.document import FactList, Prose, Sheet, sheet
@@ -34,9 +32,8 @@ if TYPE_CHECKING:
     from nutdamp.planning.screening import Checkpoints
 
 
-CHECKED = (
-    24  # largest number of rows with a range of the nutation; of more evenly spaced ones have one
-)
+# largest number of rows with a range of the nutation; of more evenly spaced ones have one
+CHECKED = 24
 FINEST = 6  # largest number of decimals of times
 DECIDED = 10.0  # s of a coast in which nobody can look at telemetry, decide and command a hold
 
@@ -56,9 +53,9 @@ def manoeuvre_blocks(
     Only a plan to fly has conditions to begin, limits to hold, boxes and signatures; ideal impulses
     have none either.
     """
-    spacecraft = plan.spacecraft
+    spacecraft, pulses = plan.spacecraft, plan.pulses
     ideal = ideal_code(plan)
-    if not plan.pulses.pulses:
+    if not pulses.pulses:
         yield Prose(summary, alarm=bool(judged.status.exit_status))
         return
     flies = judged.flies and not ideal
@@ -79,12 +76,31 @@ def manoeuvre_blocks(
     if flies:
         title = "GO at t = 0 with (nominal)" if points is None else "GO at t = 0 with"
         yield FactList(title, tuple(_conditions(spacecraft, points)))
-    yield _fired(plan, judged, points, flies=flies)
-    totals = [("totals", _totals(plan)), ("phase", _phase_note(spacecraft))]
+    rows = _rows(plan, judged, points)
+    table = DataTable("Fire" if flies else "Pulses", _columns(plan, rows), rows, flies)
+    yield sheet(table, "sheet", folds=True)
+    digits = _decimals(spacecraft)
+    date = spacecraft.utc(pulses.end, min(digits, MILLISECONDS))
+    totals = (
+        f"pulses: {len(pulses)}; on-time {math.fsum(each.loaded[1] for each in pulses):.{digits}f} "
+        f"s; {spent(pulses)}; the last ends at {pulses.end:.{digits}f} s"
+    )
+    sense = ", positive about +3, so that it falls with this spin"
+    phase = (
+        "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin"
+        if sun_phased(spacecraft)
+        else "Spin phase: angle by which the body has turned about axis 3 since t = 0"
+        + (sense if spacecraft.spin < 0.0 else "")
+    )
+    told = [
+        ("totals", totals + (f" ({date})" if date else "")),
+        ("on hold", ON_HOLD),
+        ("phase", f"{phase}, at the commanded start."),
+    ]
     if not flies:
-        yield FactList("Totals", tuple(totals))
+        yield FactList("Totals", (told[0], told[2]))
         return
-    yield FactList("Totals and hold", (totals[0], ("on hold", ON_HOLD), totals[1]))
+    yield FactList("Totals and hold", tuple(told))
     yield Sheet(
         "Signatures",
         tuple(Heading(name, number=False) for name in ("sheet", "name", "signature", "date")),
@@ -93,7 +109,11 @@ def manoeuvre_blocks(
 
 
 def _conditions(spacecraft: Spacecraft, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
-    """Spin, nutation and phase at which the first row may be fired."""
+    """Spin, nutation and phase at which the first row may be fired.
+
+    The phase window is the shift of all pulses in phase and in time with which enough cases comply,
+    rounded towards none.
+    """
     spin = f"{spacecraft.spin * RPM:.5g}"
     nutation = short_angle(spacecraft.tilt)
     if points is None:
@@ -105,33 +125,23 @@ def _conditions(spacecraft: Spacecraft, points: Checkpoints | None) -> Iterator[
     angles = f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg"
     yield "spin", f"{spins} (nominal {spin})"
     yield "nutation", f"{angles} (nominal {nutation})"
-    yield "phase window", _window(spacecraft, points)
-
-
-def _window(spacecraft: Spacecraft, points: Checkpoints) -> str:
-    """Shift of all pulses in phase and in time with which enough cases comply; rounded towards
-    none.
-    """
     probability = required_share(spacecraft.requirement)
     share = exact_percent(probability)
-    if not requirements.judged(spacecraft):
-        return "not known: nothing is required"
     window = points.window(probability)
+
+    def inwards(unit: float, digits: int) -> str:
+        scale = 10.0**digits
+        ends = (math.trunc(unit * shift * scale) / scale for shift in window or ())
+        return " to ".join(f"{end:+.{digits}f}" for end in ends)
+
+    phases = inwards(math.degrees(abs(spacecraft.spin)), 1)
+    times = inwards(1.0, _decimals(spacecraft))
+    said = f"{phases} deg from those below ({times} s): {share} of cases comply"
     if window is None:
-        return f"none: fewer than {share} of the cases comply at the phases below"
-    turn = abs(spacecraft.spin)
-    digits = _decimals(spacecraft)
-    phases = [_inwards(math.degrees(turn * shift), 1) for shift in window]
-    times = [_inwards(shift, digits) for shift in window]
-    return (
-        f"{phases[0]} to {phases[1]} deg from those below ({times[0]} to {times[1]} s): "
-        f"{share} of cases comply"
-    )
-
-
-def _inwards(value: float, digits: int) -> str:
-    scale = 10.0**digits
-    return f"{math.trunc(value * scale) / scale:+.{digits}f}"
+        said = f"none: fewer than {share} of the cases comply at the phases below"
+    if not requirements.judged(spacecraft):
+        said = "not known: nothing is required"
+    yield "phase window", said
 
 
 class SheetRow(NamedTuple):
@@ -151,35 +161,6 @@ class SheetRow(NamedTuple):
     decide: str
 
 
-def _fired(plan: Plan, judged: Verdict, points: Checkpoints | None, *, flies: bool) -> Sheet:
-    """One row a pulse or block, as it is commanded, with the nutation after it."""
-    flown, spacecraft, pulses = plan._flight, plan.spacecraft, plan.pulses.pulses
-    blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(pulses)
-    own = plan.pulses.pulses_by_block
-    counts = [numbers[-1] + 1 for numbers in own]
-    firsts = [pulses[numbers[0]] for numbers in own]
-    starts = np.array([pulse.loaded[0] for pulse in firsts])
-    turned = phases(flown)[np.array([numbers[0] for numbers in own])]
-    angles = flown.around_pulses()[1].nutation[np.array(counts) - 1].tolist()
-    ends = [pulses[count - 1].over for count in counts]
-    decide = [
-        _deadline(spacecraft, end, start)
-        for end, start in zip(ends, starts[1:].tolist(), strict=False)
-    ]
-    holds = ["not set"] * len(counts) if points is None else _ranges(points, counts, angles)
-    limit = next(
-        (line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), angles[-1]
-    )
-    holds[-1] = f"accept ≤ {short_angle(limit)}"
-    columns = zip(firsts, blocks, turned.tolist(), angles, holds, [*decide, MISSING], strict=True)
-    rows = [SheetRow(index, *row) for index, row in enumerate(columns)]
-    return sheet(
-        DataTable("Fire" if flies else "Pulses", _columns(plan, rows), rows, flies),
-        "sheet",
-        folds=True,
-    )
-
-
 def _deadline(spacecraft: Spacecraft, end: float, start: float) -> str:
     """Time by which it must be known whether the next row is fired: its start; a short coast leaves
     no time.
@@ -187,6 +168,41 @@ def _deadline(spacecraft: Spacecraft, end: float, start: float) -> str:
     if start - end < DECIDED:
         return "automatic"
     return clock(spacecraft, start) or f"{math.floor(10.0 * start) / 10.0:.1f} s"
+
+
+def _rows(plan: Plan, judged: Verdict, points: Checkpoints | None) -> list[SheetRow]:
+    """One row a pulse or block, as it is commanded, with the nutation after it; its range is that
+    of cases that end well, with the nominal value in it.
+    """
+    flown, spacecraft, pulses = plan._flight, plan.spacecraft, plan.pulses.pulses
+    own = plan.pulses.pulses_by_block
+    blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(own)
+    turned = phases(flown)
+    angles = flown.around_pulses()[1].nutation
+    counts = [numbers[-1] + 1 for numbers in own]
+    after = [float(angles[count - 1]) for count in counts]
+    holds = ["not set" if points is None else MISSING] * len(own)
+    largest = limits(spacecraft)[0]
+    if points is not None:
+        from nutdamp.planning.screening import even
+
+        shown = [number - 1 for number in even(len(own), CHECKED)]
+        ranges = points.nutation_after([counts[row] for row in shown])
+        for row, (low, high) in zip(shown, ranges, strict=True):
+            bounds = min(low, after[row]), max(high, after[row])
+            holds[row] = " to ".join(short_angle(bound, largest) for bound in bounds)
+    limit = next(
+        (line.bound.limit for line in judged.lines if line.bound.part is Part.NUTATION), after[-1]
+    )
+    holds[-1] = f"accept ≤ {short_angle(limit)}"
+    rows = []
+    for at, (numbers, block) in enumerate(zip(own, blocks, strict=True)):
+        following = [pulses[first].loaded[0] for first, *_ in own[at + 1 : at + 2]]
+        ended = pulses[numbers[-1]].over
+        decide = "".join(_deadline(spacecraft, ended, start) for start in following) or MISSING
+        first, phase = pulses[numbers[0]], float(turned[numbers[0]])
+        rows.append(SheetRow(at, first, block, phase, after[at], holds[at], decide))
+    return rows
 
 
 def _columns(plan: Plan, rows: Sequence[SheetRow]) -> list[Column]:
@@ -208,16 +224,19 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> list[Column]:
         begin = Column("", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
     if blocks:
         unit = "s" if spacecraft.commands is None else "s (counts)"
-        delay = partial(_counted, spacecraft, "delay")
-        width = partial(_counted, spacecraft, "width")
 
         def by_sun(row: SheetRow) -> float | None:
             return None if row.block is None else row.block.delay_at(spacecraft.spin)
 
+        def counted(which: str, value: float) -> str:
+            commands = spacecraft.commands
+            counts = "" if commands is None else f" ({commands.counts(which, value)})"
+            return f"{value:.6g}{counts}"
+
         fired = [
             Column("", Shared.FIRST_SUN_PULSE, "", attrgetter("block.first")),
-            Column("", Shared.DELAY, unit, by_sun, delay),
-            Column("", Shared.ON_TIME, unit, attrgetter("block.width"), width),
+            Column("", Shared.DELAY, unit, by_sun, partial(counted, "delay")),
+            Column("", Shared.ON_TIME, unit, attrgetter("block.width"), partial(counted, "width")),
             Column("", Shared.PULSES, "", attrgetter("block.count")),
             Column("", Shared.EVERY, "spin", attrgetter("block.every")),
         ]
@@ -252,32 +271,6 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> list[Column]:
     return [column._replace(where="sheet") for column in columns]
 
 
-def _counted(spacecraft: Spacecraft, which: str, value: float) -> str:
-    """A ``delay`` or ``width`` in s, and in counts of the steps of the commands, where the file has
-    them.
-    """
-    counts = (
-        f" ({spacecraft.commands.counts(which, value)})" if spacecraft.commands is not None else ""
-    )
-    return f"{value:.6g}{counts}"
-
-
-def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float]) -> list[str]:
-    """Range of the nutation after each row that has one, of cases that end well, with that
-    ``expected`` (rad) in it.
-    """
-    from nutdamp.planning.screening import even
-
-    limit = limits(points.study.model.spacecraft)[0]
-    rows = [number - 1 for number in even(len(counts), CHECKED)]
-    texts = [MISSING] * len(counts)
-    ranges = points.nutation_after([counts[row] for row in rows])
-    for row, (low, high) in zip(rows, ranges, strict=True):
-        bounds = min(low, expected[row]), max(high, expected[row])
-        texts[row] = " to ".join(short_angle(bound, limit) for bound in bounds)
-    return texts
-
-
 def _thrusters(pulse: Pulse, spacecraft: Spacecraft) -> str:
     """Channel of a pulse, with its thrusters where they have other names."""
     if pulse.channel == STEERABLE:
@@ -288,32 +281,6 @@ def _thrusters(pulse: Pulse, spacecraft: Spacecraft) -> str:
         pulse.channel
         if members in ([], [pulse.channel])
         else f"{pulse.channel} ({', '.join(members)})"
-    )
-
-
-def _phase_note(spacecraft: Spacecraft) -> str:
-    if sun_phased(spacecraft):
-        return (
-            "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, "
-            "at the commanded start."
-        )
-    falls = ", positive about +3, so that it falls with this spin" if spacecraft.spin < 0.0 else ""
-    return (
-        f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, "
-        "at the commanded start."
-    )
-
-
-def _totals(plan: Plan) -> str:
-    pulses = plan.pulses
-    spacecraft = plan.spacecraft
-    digits = _decimals(plan.spacecraft)
-    on = math.fsum(pulse.loaded[1] for pulse in pulses)
-    date = spacecraft.utc(pulses.end, min(digits, MILLISECONDS))
-    ends = f"{pulses.end:.{digits}f} s" + (f" ({date})" if date else "")
-    return (
-        f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent(pulses)}; "
-        f"the last ends at {ends}"
     )
 
 

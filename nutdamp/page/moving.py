@@ -33,8 +33,8 @@ from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.parts import channel_text, direction_columns
 from nutdamp.views.text import MISSING, limit_text, quantity
 
+# even rows in the quickest nutation turn; least and largest number of them altogether
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
-"""Even rows in the quickest nutation turn; least and largest number of them altogether."""
 
 # rows in a turn below which a line from row to row is no picture of the path, and dots are drawn
 COARSE = 12
@@ -43,21 +43,15 @@ SPHERE = 10_000  # length of a unit vector of the globe as whole numbers: 0.006 
 ANGLE_DIGITS = 4  # decimals of degrees; more where the largest nutation has not so many figures
 # largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
 FAR = 4.0
+# largest angle of the cones over the nutation that its scale has room for: of a despun body with a
+# wheel they measure 90 deg
 APART = 10.0
-"""Largest angle of the cones over the nutation that its scale has room for: of a despun body with a
-wheel they measure 90 deg.
-"""
 END = 0.03  # radius of the mark of the end of the spin axis over half the side of that panel
 NONE = -(10**8)  # entry of a row for an angle that does not exist
+# frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom
 EDGES = (350, 150, 1960, 1760)
-"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right,
-bottom.
-"""
-QUICK, UNHURRIED, SLOW = (
-    4.0,
-    15.0,
-    120.0,
-)  # seconds that playing takes at the quickest, at first, and at the slowest
+# seconds that playing takes at the quickest, at first, and at the slowest
+QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
 
 
 def named_directions(spacecraft: Spacecraft) -> list[dict[str, Any]]:
@@ -67,22 +61,17 @@ def named_directions(spacecraft: Spacecraft) -> list[dict[str, Any]]:
     """
     directions = []
     if spacecraft.goal.axis is not None:
-        circles = [
-            (f"H at most {limit_text(bound.limit)} from target", bound.limit, "target")
-            for bound in requirements.required(spacecraft)
-            if bound.part is Part.DISTANCE
-        ]
+        ends = [each for each in requirements.required(spacecraft) if each.part is Part.DISTANCE]
+        circles = [(f"H at most {limit_text(each.limit)} from target", each.limit, "target")
+                   for each in ends]  # fmt: skip
         directions.append(("target", spacecraft.goal.axis, "target", circles))
     for keep in spacecraft.watched:
         if keep.direction is not None:
-            bounds = [
-                ("least", keep.least, "keep-out", keep.least > 0.0),
-                ("most", keep.most, "keep-in", keep.most < math.pi),
-            ]
+            bounds = (("least", keep.least, "keep-out"), ("most", keep.most, "keep-in"))
             circles = [
                 (f"axis at {word} {limit_text(size)} from {keep.name}", size, kind)
-                for word, size, kind, bounded in bounds
-                if bounded
+                for word, size, kind in bounds
+                if 0.0 < size < math.pi
             ]
             directions.append((keep.name, keep.direction, "watched", circles))
     return [
@@ -113,9 +102,8 @@ def moving_of(
     turns = until / geometry.quickest(flown)
     samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
-    pole = geometry.pole_path(track)
-    sky, momentum = geometry.sky_paths(flown, track)
-    target = geometry.sky_target(flown, track)
+    pole = np.degrees(track.rates[:, :2])
+    sky, momentum, target = geometry.sky_paths(flown, track)
     # Only if the globe names it and it leaves room for the paths.
     reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
     if not (named and np.all(np.hypot(*target.T) <= reach)):
@@ -127,26 +115,40 @@ def moving_of(
     x, y, _ = geometry.sky_names(flown)
     rates = f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s"
     strip, span = strip_of(flown, track, until)
-    numbers, digits = _numbers(flown, track, until)
-    texts = {"none": 0}
-    firing = []
+    # Whole numbers of the last decimal: four figures of the largest nutation.
+    largest = math.degrees(float(track.nutation.max()))
+    cone = ANGLE_DIGITS
+    if largest >= geometry.LEAST:
+        cone = max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
+    clock = max(3, math.ceil(-math.log10(until / (len(track.t) - 1))) + 1)
+    # The angles of the spin axis, as every table shows them.
+    pointing = [
+        [
+            NONE if text == MISSING else round(float(text) * 10**ANGLE_DIGITS)
+            for text in map(angle.shown, track.axis)
+        ]
+        for angle in direction_columns(spacecraft)
+    ]
     names = [
         f"{number}: {channel_text(pulse, spacecraft)}"
         for number, pulse in enumerate(flown.schedule, 1)
     ]
-    for time in track.t.tolist():  # the number of the text that names the firings at each row
-        on = (
-            name
-            for name, (begins, ends) in zip(names, flown.spans, strict=True)
-            if begins <= time <= ends
-        )
-        firing.append(texts.setdefault(" and ".join(on) or "none", len(texts)))
+    spans = [*zip(names, flown.spans, strict=True)]
+    said = [
+        " and ".join(name for name, (begins, ends) in spans if begins <= time <= ends) or "none"
+        for time in track.t.tolist()
+    ]
+    texts = [*dict.fromkeys(["none", *said])]  # whose number stands in each row
     columns = {
         **_numbered("pole", placed(pole, *pole_room)),
         **_numbered("sky", placed(sky, *sky_room)),
         **_numbered("momentum", placed(momentum, *sky_room)),
-        **numbers,
-        "firing": firing,
+        "t": _whole(track.t, clock),
+        "theta": _whole(np.degrees(track.nutation), cone),
+        "mu": _whole(np.degrees(track.body_cone), cone),
+        "lambda": _whole(np.degrees(track.space_cone), cone),
+        **_numbered("angle", pointing),
+        "firing": [texts.index(text) for text in said],
     }
     if named:
         for name, ways in (("axis", track.axis), ("H", track.momentum)):
@@ -161,7 +163,7 @@ def moving_of(
     absent = absence(spacecraft, flown.schedule)
     bench = None if absent else workbench(flown, track, (pole_room, sky_room), until, craft)
     data: dict[str, Any] = {
-        "digits": digits,
+        "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
         "until": until,
         "samples": samples,
         "lead": LEAD,
@@ -170,8 +172,8 @@ def moving_of(
         # changes.
         "columns": {name: np.diff(values, prepend=0).tolist() for name, values in columns.items()},
         "none": NONE,
-        "firings": [*texts],
-        "utc": _dates(spacecraft, track, digits["t"]),
+        "firings": texts,
+        "utc": _dates(spacecraft, track, clock),
         "target": [column[0] for column in placed(target, *sky_room) if column] or None,
         "named": named,
         "look": _look(track, named),
@@ -201,36 +203,6 @@ def moving_of(
     }
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
     return Moving(shown, text)
-
-
-def _numbers(
-    flown: Flight, track: Track, until: float
-) -> tuple[dict[str, list[int]], dict[str, int]]:
-    """Time and angles of each row as whole numbers of the last of their decimals, and how many
-    decimals these have.
-    """
-    largest = math.degrees(float(track.nutation.max()))
-    # Four figures of the largest nutation.
-    cone = ANGLE_DIGITS
-    if largest >= geometry.LEAST:
-        cone = max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
-    clock = max(3, math.ceil(-math.log10(until / (len(track.t) - 1))) + 1)
-    # The angles of the spin axis, as every table shows them, in units of their last decimal.
-    pointing = [
-        [
-            NONE if text == MISSING else round(float(text) * 10**ANGLE_DIGITS)
-            for text in map(angle.shown, track.axis)
-        ]
-        for angle in direction_columns(flown.spacecraft)
-    ]
-    numbers = {
-        "t": _whole(track.t, clock),
-        "theta": _whole(np.degrees(track.nutation), cone),
-        "mu": _whole(np.degrees(track.body_cone), cone),
-        "lambda": _whole(np.degrees(track.space_cone), cone),
-        **_numbered("angle", pointing),
-    }
-    return numbers, {"t": clock, "cone": cone, "angle": ANGLE_DIGITS}
 
 
 def _command(plan: Plan, craft: str, until: float, samples: int) -> tuple[str, ...]:
@@ -299,16 +271,13 @@ def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first
 
 
-EDGE = (
-    0.03  # part of a scale at either end without a number: it would touch those of the other scale
-)
+# part of a scale at either end without a number: it would touch those of the other scale
+EDGE = 0.03
 LEAD = 0.012  # part of the axis of time before t = 0: motion at t = 0 is seen beside the cursor
 
+# prefixes of units with their factors, and the largest number of a scale that needs another one
 PREFIXES = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9))
 SHORT = 0.05
-"""Prefixes of units with their factors,
-and the largest number of a scale that needs another one.
-"""
 
 
 def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
@@ -341,10 +310,6 @@ def panel(
         named = name.replace(", deg", f", {prefix}deg")
         scales.append(_scale(named, map(float, places), (factor * values).tolist()))
     x, y = scales
-    paths = [
-        (kind, "L".join(f"{across} {along}" for across, along in zip(*line, strict=True)))
-        for kind, line in outlines
-    ]
     return {
         "part": part,
         "title": title,
@@ -353,7 +318,10 @@ def panel(
         "y": y,
         "zero": [column[0] for column in placed(np.zeros((1, 2)), middle, half)],
         "frame": EDGES,
-        "outlines": [(kind, f"M{path}Z") for kind, path in paths],
+        "outlines": [
+            (kind, f"M{'L'.join(f'{one} {other}' for one, other in zip(*line, strict=True))}Z")
+            for kind, line in outlines
+        ],
     }
 
 

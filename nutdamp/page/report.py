@@ -23,7 +23,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rich.console import Group
 from rich.text import Text
 
 from nutdamp import __version__
@@ -35,17 +34,22 @@ from nutdamp.figures.style import require
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
 from nutdamp.flight.verification import verify
-from nutdamp.page import document
 from nutdamp.page.document import (
+    UNCONTROLLED,
     Block,
     Control,
     Details,
+    Download,
     FactList,
+    Listing,
+    Moving,
     Page,
     PageSection,
     Picture,
     Points,
     Prose,
+    fact_list,
+    sheet,
 )
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
@@ -59,29 +63,26 @@ from nutdamp.planning.verdict import Light, Verdict
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import glance, guide
 from nutdamp.views import verdict as verdicts
-from nutdamp.views.check import check_screen
+from nutdamp.views.check import check_parts
 from nutdamp.views.glance import scheme_table
-from nutdamp.views.guide import Topic
 from nutdamp.views.parts import NOTES, block_table, pulse_table
-from nutdamp.views.simulation import (
-    BUDGET_NOTE,
-    budget_table,
-    conservation,
-    methods_table,
-    verdict,
-)
-from nutdamp.views.text import WARNING, joined, sentence, severity, text
-from nutdamp.views.trade import front_parts, trade_notes
+from nutdamp.views.simulation import BUDGET_NOTE, budget_table, conservation, methods_table, verdict
+from nutdamp.views.text import WARNING, joined, screen_line, sentence, severity, text
+from nutdamp.views.trade import front_notes, front_tables, trade_notes
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from nutdamp.planning.screening import Dispersion
+    from nutdamp.montecarlo.study import Results
 
 
 ENDINGS = (".html", ".htm")  # endings of the files that a page is written to
+
+# text in which no line may break: an option of a command, a relation with its number and unit, a
+# date
+WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?|\d{4}-\d\d-\d\d[\dT:.Z]*)")
 
 
 def expect_html(path: str) -> None:
@@ -94,50 +95,39 @@ def expect_html(path: str) -> None:
         raise BadRequest(
             f"--output {path}: a report is written as HTML (.html); a browser prints that as PDF"
         )
-    _require_jinja()
-    require()
-
-
-def _require_jinja() -> None:
     if find_spec("jinja2") is None:
         raise MissingExtra("plot", "a page")
+    require()
 
 
 def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no
     other script.
     """
-    moves = isinstance(page.motion, document.Moving)
+    styles, scripts = ["page.css"], ["page.js"]
+    if isinstance(page.motion, Moving):
+        styles.append("view.css")
+        scripts += ["motion.js", "bench.js", "view.js"]
+    folder = files("nutdamp.page")
     style, script = (
-        "\n".join(
-            files("nutdamp.page").joinpath(name).read_text("utf-8").strip()
-            for name in (first, *views * moves)
-        )
-        for first, views in (
-            ("page.css", ["view.css"]),
-            ("page.js", ["motion.js", "bench.js", "view.js"]),
-        )
+        "\n".join(folder.joinpath(name).read_text("utf-8").strip() for name in names)
+        for names in (styles, scripts)
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    return (
-        _templates()
-        .get_template("page.html")
-        .render(page=page, style=style, script=script, digest=digest)
-    )
+    template = _templates().get_template("page.html")
+    return template.render(page=page, style=style, script=script, digest=digest)
 
 
 def block_html(block: Block) -> str:
     """One block of a page, in a box of its own to scroll in where it may be wide."""
-    return (
-        _templates()
-        .from_string('{% from "blocks.html" import block %}{{ block(made) }}')
-        .render(made=block)
-    )
+    template = _templates().from_string('{% from "blocks.html" import block %}{{ block(made) }}')
+    return template.render(made=block)
 
 
 @cache
 def _templates() -> Environment:
-    _require_jinja()
+    if find_spec("jinja2") is None:
+        raise MissingExtra("plot", "a page")
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -152,14 +142,8 @@ def _templates() -> Environment:
     environment.filters["css"] = lambda text: re.sub(
         "[^A-Za-z0-9]", lambda char: f"\\{ord(char[0]):x} ", text
     )
-    environment.filters.update(whole=_whole, number=document.number_in)
+    environment.filters["whole"] = _whole
     return environment
-
-
-WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?|\d{4}-\d\d-\d\d[\dT:.Z]*)")
-"""Text in which no line may break: an option of a command, a relation with its number and unit, a
-date.
-"""
 
 
 def _whole(text: str) -> Markup:
@@ -231,6 +215,12 @@ class Repeat(NamedTuple):
         """SHA-256 of the input file; empty without one."""
         return hashlib.sha256(self.text.encode()).hexdigest() if self.text else ""
 
+    @property
+    def file(self) -> str:
+        """Name and digest of the input file; empty without one."""
+        name = printable(Path(self.name).name)
+        return f"{name}, SHA-256 {self.digest}" if self.text else ""
+
 
 def called(spacecraft: Spacecraft, how: str) -> Repeat:
     """The call in Python that makes a page again; where fields were replaced, no file stands for
@@ -247,16 +237,18 @@ def repeated(command: str, source: Source, goal: tuple[str, ...] = ()) -> Repeat
     return Repeat(command, source.name, source.text, settings, goal)
 
 
+SHOWN = 8  # pulses on the first screen; of more the first and the last
+
+
 def report_page(
     compared: Comparison,
     repeat: Repeat,
     *,
     traded: Sequence[Front] = (),
-    control: Control = document.UNCONTROLLED,
+    control: Control = UNCONTROLLED,
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     spacecraft, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
-    lead, about = verdicts.headline(judged, compared)
     remarks = glance.notes(compared)
     notes = [text(note) for note in remarks if severity(note) != WARNING]
     warnings = [text(note) for note in remarks if severity(note) == WARNING]
@@ -266,92 +258,44 @@ def report_page(
             control=control,
             source=f"input {repeat.digest[:8]}" if repeat.digest else "",
             state=judged.light.value,
-            headline=(lead, about),
+            headline=verdicts.headline(judged, compared),
             notes=tuple(notes[:NOTES]),
             made_by=f"nutdamp {__version__}",
             verdict="" if chosen is None else verdicts.statement(judged),
             warnings=tuple(warnings),
         )
         if chosen is not None:
-            broken = (
-                broken_limits(spacecraft, chosen.pulses) if chosen._from_file else []
-            )  # schemes break none
+            # Schemes break no limit.
+            broken = broken_limits(spacecraft, chosen.pulses) if chosen._from_file else []
+            blocks = bool(chosen.pulses.blocks)
+            limit, _ = glance.limits(spacecraft)
+            fired = sheet(
+                block_table(chosen._flight) if blocks else pulse_table(chosen._flight, limit=limit),
+                "screen",
+                title="Blocks" if blocks else "Pulses",
+            )
+            few = fired.rows if len(fired.rows) <= SHOWN else (fired.rows[0], fired.rows[-1])
+            flown, track = overview.shown(chosen)
+            outlines = studies.accepted(flown, judged)
+            course = partial(overview.flight_figure, "course", flown, track, judged)
+            box = partial(studies.acceptance_figure, judged, compared.others)
             page = replace(
                 page,
                 broken=tuple(broken),
                 state=Light.AMBER.value if broken and judged.light is Light.GREEN else page.state,
-                bounds=document.sheet(verdicts.bound_table(judged)),
+                bounds=sheet(verdicts.bound_table(judged)),
                 lines=tuple(judged.lines),
-                pulses=_fired(chosen),
-                count=len(chosen.pulses.blocks) or len(chosen.pulses),
-                facts=document.facts_of("Final state, after the last pulse", glance.ends(chosen)),
-                acceptance=acceptance_picture(compared),
+                pulses=fired._replace(rows=few),
+                count=len(fired.rows),
+                facts=fact_list("Final state, after the last pulse", glance.ends(chosen)),
+                acceptance=picture("acceptance", box),
                 warnings=(*warnings, *broken),
-                motion=moving_of(
-                    chosen,
-                    repeat.craft(built_in=spacecraft.built_in),
-                    studies.accepted(chosen._flight, judged),
-                ),
-                still=flight_picture(chosen, judged),
+                motion=moving_of(chosen, repeat.craft(built_in=spacecraft.built_in), outlines),
+                still=picture("course", partial(course, outlines=outlines)),
             )
         task.reach(1.0)
-        sections = _sections(compared, judged, repeat, page, traded, notes[NOTES:])
-        return replace(page, sections=tuple(sections))
-
-
-SHOWN = 8  # pulses on the first screen; of more the first and the last
-
-
-def _fired(chosen: Plan) -> document.Sheet:
-    """Pulses of the first screen, or command blocks."""
-    limit = glance.limits(chosen.spacecraft)[0]
-    blocks = bool(chosen.pulses.blocks)
-    table = block_table(chosen._flight) if blocks else pulse_table(chosen._flight, limit=limit)
-    shown = document.sheet(table, "screen")._replace(title="Blocks" if blocks else "Pulses")
-    if len(shown.rows) <= SHOWN:
-        return shown
-    return shown._replace(rows=(shown.rows[0], shown.rows[-1]))
-
-
-def _sections(
-    compared: Comparison,
-    judged: Verdict,
-    repeat: Repeat,
-    page: Page,
-    traded: Sequence[Front],
-    more_notes: Sequence[str],
-) -> Iterator[PageSection]:
-    """Sections below the first screen."""
-    chosen = compared.recommended
-    dispersed = _cases_of(compared)
-    yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
-    if chosen is not None:
-        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
-    if dispersed is not None:
-        yield PageSection("dispersion", "Dispersion", tuple(_dispersion(dispersed)))
-    if traded:
-        craft = repeat.craft(built_in=compared.spacecraft.built_in)
-        yield PageSection("trade", "Time against cost", tuple(_trade(compared, traded, craft)))
-    if chosen is not None:
-        title = f"Manoeuvre sheet: {compared.spacecraft.name}, {chosen.scheme}"
-        identity = [("document", page.control.line), ("input file", _file_line(repeat))]
-        entries = [(name, text) for name, text in identity if text]
-        blocks = manoeuvre_blocks(chosen, judged, entries, page.summary)
-        yield PageSection("manoeuvre", title, tuple(blocks))
-    yield PageSection("background", "Background", tuple(_background(compared, judged, repeat)))
-
-
-def _cases_of(compared: Comparison) -> Dispersion | None:
-    """Dispersed cases of the plan of the page; None where they were not flown."""
-    from nutdamp.montecarlo.study import Results
-    from nutdamp.planning.screening import Dispersion
-
-    judged, chosen = compared.verdict, compared.recommended
-    if chosen is None or not isinstance(judged.results, Results):
-        return None
-    dispersion = Dispersion(judged.results, plan=chosen)
-    vars(dispersion)["verdict"] = judged
-    return dispersion
+        sections = tuple(_sections(compared, repeat, page, traded, notes[NOTES:]))
+        return replace(page, sections=sections)
 
 
 def _titled(title: str, spacecraft: Spacecraft) -> str:
@@ -367,201 +311,206 @@ def _titled(title: str, spacecraft: Spacecraft) -> str:
         aims.append(f"spin at {RPM * spacecraft.goal.spin:.4g} rpm")
     if spacecraft.built_in:
         aims.append("built-in example")
-    return " · ".join([spacecraft.name, ", ".join(aims)]) if aims else spacecraft.name
+    return " · ".join(filter(None, (spacecraft.name, ", ".join(aims))))
 
 
-def _dispersion(dispersed: Dispersion) -> Iterator[Block]:
-    """Verdict, and the final H of the cases; percentiles, budget and worst cases behind a title."""
-    from nutdamp.views.dispersion import dispersion_screen, verdict_lines
+# Captions and descriptions of the pictures, and whether a title stands above them: those of the
+# first screen stand beside its headline.
+PICTURES = {
+    "course": (
+        "Axis track: the spin axis in space, with the places of the angular momentum H; "
+        "nutation on a log axis with what is required; the firings of each channel.",
+        "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
+        False,
+    ),
+    "acceptance": (
+        "A scheme whose point, or whole contour, lies in the grey box keeps both limits. Dashed: "
+        "too few cases comply. Schemes far outside are arrows at the edge.",
+        "Acceptance box: nutation left against the tightest other limit, one contour a scheme",
+        False,
+    ),
+    "trade": (
+        "Each mark is a schedule for one of the end times tried, numbered along each front.",
+        "Cost of schedules over the end of the last pulse",
+        True,
+    ),
+    "momentum": (
+        "Where H ends in each case, with the ellipse that holds as many cases as must comply.",
+        "Scatter of the final angular momentum with ellipse",
+        True,
+    ),
+}
 
-    judged, results = dispersed.verdict, dispersed.core
-    told = [line for line in verdict_lines(judged, results) if isinstance(line, Text)]
-    lines = [Prose(document.plain(line)) for line in told]
-    note = results.study.lightening_error
-    lines += [Prose(f"Note: {note}.")] if note else []
-    required = document.sheet(verdicts.bound_table(judged))
-    yield from lines
-    yield dispersion_picture(dispersed)
-    rest = [
-        block
-        for block in document.blocks_of(
-            "What is left, by share of the cases", dispersion_screen(dispersed, worst=5)
-        )
-        if block not in lines and getattr(block, "rows", ()) != required.rows
-    ]
-    yield Details("Percentiles, tolerance budget and worst cases", tuple(rest))
 
-
-def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
-    """The comparison with the reason of the recommendation, and remarks that have no room on the
-    first screen.
+def picture(name: str, draw: Callable[..., Figure]) -> Picture:
+    """One of `PICTURES`, with its title as text of the page, and its ``narrow`` drawing for a
+    phone.
     """
-    yield Prose(sentence(joined(reasons(compared))))
-    chosen = compared.recommended
-    yield document.sheet(scheme_table(compared, chosen))
+    caption, described, titled = PICTURES[name]
+    figures = [draw(narrow=narrow) for narrow in (False, True)]
+    title = str(figures[0].get_label()) if titled else ""
+    return Picture(title, caption, *(image.svg(figure, described) for figure in figures))
+
+
+def _sections(
+    compared: Comparison,
+    repeat: Repeat,
+    page: Page,
+    traded: Sequence[Front],
+    more_notes: Sequence[str],
+) -> Iterator[PageSection]:
+    """Sections below the first screen; ``more_notes``: those that have no room on it."""
+    from nutdamp.montecarlo.study import Results
+
+    spacecraft, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
+    why = Prose(sentence(joined(reasons(compared))))
+    schemes: list[Block] = [why, sheet(scheme_table(compared, chosen))]
     rows = [("", note) for note in more_notes]
     for plan in compared.plans:
         if plan.feasible and plan is not chosen:
             told = (text(note).removeprefix(f"{plan.scheme}: ") for note in plan_notes(plan))
             rows += [(plan.scheme, words) for words in told]
     if rows:
-        yield Details("Notes on the schemes", (Points(tuple(rows)),))
-
-
-def _trade(compared: Comparison, traded: Sequence[Front], craft: str) -> Iterator[Block]:
-    if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
-        yield trade_picture(compared, traded)
-    chosen = compared.recommended
-    notes = () if chosen is None else trade_notes(traded, chosen, compared.verdict, craft)
-    yield from (Prose(sentence(text(note))) for note in notes)
-    yield from document.blocks_of(
-        "Schedules by their ends", Group(*front_parts(compared.spacecraft, traded))
-    )
+        schemes.append(Details("Notes on the schemes", (Points(tuple(rows)),)))
+    yield PageSection("schemes", "Schemes compared", tuple(schemes))
+    if chosen is not None:
+        yield PageSection("verification", "Verification", tuple(_verification(chosen)))
+        if isinstance(judged.results, Results):
+            blocks = tuple(_dispersion(chosen, judged, judged.results))
+            yield PageSection("dispersion", "Dispersion", blocks)
+    if traded:
+        blocks = tuple(_trade(compared, traded, repeat.craft(built_in=spacecraft.built_in)))
+        yield PageSection("trade", "Time against cost", blocks)
+    if chosen is not None:
+        title = f"Manoeuvre sheet: {spacecraft.name}, {chosen.scheme}"
+        identity = [("document", page.control.line), ("input file", repeat.file)]
+        entries = [(name, text) for name, text in identity if text]
+        blocks = tuple(manoeuvre_blocks(chosen, judged, entries, page.summary))
+        yield PageSection("manoeuvre", title, blocks)
+    yield PageSection("background", "Background", tuple(_background(compared, repeat)))
 
 
 def _verification(chosen: Plan) -> Iterator[Block]:
-    spacecraft = chosen.spacecraft
-    verified = verify(
-        spacecraft, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances
-    )
+    known = chosen.options.with_disturbances
+    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=known)
     yield Prose(f"{verdict(verified)} {sentence(text(conservation(verified)))}")
-    blocks: list[Block] = [document.sheet(methods_table(verified), "screen")]
-    missing = [
-        (method.name, f"not flown; {method.missing}")
-        for method in verified.methods
-        if method.missing
-    ]
+    blocks: list[Block] = [sheet(methods_table(verified), "screen")]
+    missing = [(each.name, f"not flown; {each.missing}") for each in verified.methods
+               if each.missing]  # fmt: skip
     if missing:
         blocks.append(Points(tuple(missing)))
-    budget = budget_table(spacecraft, verified)
-    blocks += [document.sheet(budget, "screen"), Prose(BUDGET_NOTE)]
-    yield Details("Independent flights and error budget", tuple(blocks))
+    budget = sheet(budget_table(chosen.spacecraft, verified), "screen")
+    yield Details("Independent flights and error budget", (*blocks, budget, Prose(BUDGET_NOTE)))
 
 
-def _background(compared: Comparison, judged: Verdict, repeat: Repeat) -> Iterator[Block]:
-    spacecraft = compared.spacecraft
+def _dispersion(chosen: Plan, judged: Verdict, results: Results) -> Iterator[Block]:
+    """Verdict, and the final H of the cases; percentiles, budget and worst cases behind a title."""
+    from nutdamp.planning.screening import Dispersion
+    from nutdamp.views import dispersion
+
+    study = results.study
+    for line in dispersion.verdict_lines(judged, results):
+        if isinstance(line, Text):
+            yield Prose(line.plain)
+    if study.lightening_error:
+        yield Prose(f"Note: {study.lightening_error}.")
+    if results.emptied:
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        yield Prose(f"Tank empty too soon in {share} of cases: {dispersion.EMPTY}.")
+    dispersed = Dispersion(results, plan=chosen)
+    vars(dispersed)["verdict"] = judged
+    yield picture("momentum", partial(studies.dispersion_figure, dispersed, "momentum"))
+    redrawn = f", unphysical and drawn again: {results.redrawn:,}" if results.redrawn else ""
     yield Details(
-        "Spacecraft",
-        tuple(document.blocks_of("What actuators and tolerances do", check_screen(spacecraft))),
+        "Percentiles, tolerance budget and worst cases",
+        (
+            Prose(f"{chosen.scheme}; cases: {results.done:,}, seed {study.seed}{redrawn}"),
+            *_cases(chosen, results),
+        ),
     )
-    chosen = compared.recommended
+
+
+def _cases(chosen: Plan, results: Results) -> Iterator[Block]:
+    """Percentiles, the nominal case, tolerance budget and worst cases of a study."""
+    from nutdamp.views import dispersion
+
+    study = results.study
+    nominal = study.outputs_of({})
+    table = dispersion.percentile_table(results, dispersion.FLOWN_OUTPUTS, nominal, alone=True)
+    yield sheet(table, "full", title="What is left, by share of the cases")
+    if not results.exact:
+        yield Prose(dispersion.ACCURACY)
+    yield fact_list("Nominal case", glance.end_rows(chosen._flight, chosen._aspects))
+    budget, caption = dispersion.budget_of(results)
+    if budget is not None:
+        yield sheet(budget, "screen")
+    yield Prose(caption)
+    if budget is not None:
+        yield sheet(dispersion.worst_table(results, 5), "screen")
+        inspect = f"nutdamp disperse, as here, with {dispersion.again(results)}"
+        yield Prose(f"Inspect one: {inspect}")
+    for note in dispersion.unused_notes(study.model.inputs.unused):
+        yield Prose(screen_line(note).plain)
+
+
+def _trade(compared: Comparison, traded: Sequence[Front], craft: str) -> Iterator[Block]:
+    spacecraft, chosen = compared.spacecraft, compared.recommended
+    if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
+        trade = Trade(spacecraft, tuple(traded), chosen)
+        yield picture("trade", partial(studies.trade_figure, trade))
+    notes = () if chosen is None else trade_notes(traded, chosen, compared.verdict, craft)
+    for note in notes:
+        yield Prose(sentence(text(note)))
+    for name, reason, table in front_tables(spacecraft, traded):
+        if reason or not table.rows:
+            yield Prose(": ".join((name, *reason)))
+        if table.rows:
+            yield sheet(table, "full", title=name)
+    yield from map(Prose, front_notes(traded))
+
+
+# equations of Magnus that every plan and flight rest on, as the guide numbers them
+EQUATIONS = ("1", "17", "18", "19")
+
+PACKAGES = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "highspy": "highspy",
+    "matplotlib": "matplotlib",
+    "bsk": "Basilisk",
+}  # that numbers and pictures depend on, with their names for people
+
+
+def _background(compared: Comparison, repeat: Repeat) -> Iterator[Block]:
+    spacecraft, judged, chosen = compared.spacecraft, compared.verdict, compared.recommended
+    facts, tables, notes = check_parts(spacecraft)
+    told = (Prose(screen_line(note).plain) for note in notes)
+    sheets = (sheet(table, "screen") for table in tables)
+    yield Details("Spacecraft", (fact_list(spacecraft.name, facts), *sheets, *told))
     if chosen is not None:
-        ends = document.facts_of("Final state", glance.end_facts(chosen))
-        fired = pulse_table(chosen._flight, scheme=chosen.scheme)
-        yield Details("Pulses and final state, all values", (document.sheet(fired), ends))
+        ends = fact_list("Final state", glance.final_rows(chosen))
+        fired = sheet(pulse_table(chosen._flight, scheme=chosen.scheme))
+        yield Details("Pulses and final state, all values", (fired, ends))
     yield Details("Method and symbols", tuple(_method(compared)))
     yield Details("Assumptions", (Points(tuple(("", limit) for limit in assumptions(compared))),))
-    yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, judged)))
-
-
-def _file_line(repeat: Repeat) -> str:
-    """Name and digest of the input file; empty without one."""
-    return f"{printable(Path(repeat.name).name)}, SHA-256 {repeat.digest}" if repeat.text else ""
-
-
-def _repeat(repeat: Repeat, judged: Verdict) -> Iterator[Block]:
-    yield document.Listing("Command", printable(repeat.command))
-    facts = (
-        [] if judged.cases is None else [("seed of the dispersed cases", str(judged.cases.seed))]
-    )
-    facts += [("input file", _file_line(repeat))] if repeat.text else []
-    yield FactList("Versions", (*_versions(), *facts))
+    versions = [("nutdamp", __version__), ("Python", platform.python_version())]
+    for package, name in PACKAGES.items():
+        try:
+            versions.append((name, version(package)))
+        except PackageNotFoundError:
+            versions.append((name, "not installed"))
+    if judged.cases is not None:
+        versions.append(("seed of the dispersed cases", str(judged.cases.seed)))
+    if repeat.file:
+        versions.append(("input file", repeat.file))
+    again: list[Block] = [Listing("Command", printable(repeat.command))]
+    again.append(FactList("Versions", tuple(versions)))
     if repeat.settings:
-        yield FactList("Set in place of what the file says", repeat.settings)
+        again.append(FactList("Set in place of what the file says", repeat.settings))
     if repeat.text:
         stem = "spacecraft" if repeat.name == "-" else printable(Path(repeat.name).stem)
-        yield document.Download(f"{stem}.yaml", repeat.text)
-
-
-def _versions() -> Iterator[tuple[str, str]]:
-    """Versions of the packages that numbers and pictures depend on."""
-    yield "nutdamp", __version__
-    yield "Python", platform.python_version()
-    packages = {
-        "numpy": "numpy",
-        "scipy": "scipy",
-        "highspy": "highspy",
-        "matplotlib": "matplotlib",
-        "bsk": "Basilisk",
-    }
-    for package, name in packages.items():
-        try:
-            yield name, version(package)
-        except PackageNotFoundError:
-            yield name, "not installed"
-
-
-PICTURES = {
-    "course": (
-        "Axis track: the spin axis in space, with the places of the angular momentum H; "
-        "nutation on a log axis with what is required; the firings of each channel.",
-        "Track of the spin axis in space, nutation and firings over time, with numbered pulses",
-    ),
-    "acceptance": (
-        "A scheme whose point, or whole contour, lies in the grey box keeps both limits. Dashed: "
-        "too few cases comply. Schemes far outside are arrows at the edge.",
-        "Acceptance box: nutation left against the tightest other limit, one contour a scheme",
-    ),
-    "trade": (
-        "Each mark is a schedule for one of the end times tried, numbered along each front.",
-        "Cost of schedules over the end of the last pulse",
-    ),
-    "momentum": (
-        "Where H ends in each case, with the ellipse that holds as many cases as must comply.",
-        "Scatter of the final angular momentum with ellipse",
-    ),
-}
-"""Captions and descriptions of the pictures."""
-
-
-FIRST = ("course", "acceptance")  # pictures of the first screen
-
-
-def flight_picture(plan: Plan, judged: Verdict) -> Picture:
-    """Axis track and history of a plan, from its flight through the real widths; raises
-    MissingExtra.
-    """
-    flown, track = overview.shown(plan)
-    outlines = studies.accepted(flown, judged)
-    draw = partial(overview.flight_figure, "course", flown, track, judged, outlines=outlines)
-    return _picture("course", draw)
-
-
-def acceptance_picture(compared: Comparison) -> Picture:
-    """Schemes beside the limits; raises MissingExtra."""
-    draw = partial(studies.acceptance_figure, compared.verdict, compared.others)
-    return _picture("acceptance", draw)
-
-
-def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
-    """Time against cost, with the recommended plan among the schedules of the fronts; raises
-    MissingExtra.
-    """
-    traded = Trade(compared.spacecraft, tuple(fronts), compared.recommended)
-    return _picture("trade", partial(studies.trade_figure, traded))
-
-
-def dispersion_picture(dispersed: Dispersion) -> Picture:
-    """Final directions of H in the cases of a study; raises MissingExtra."""
-    return _picture("momentum", partial(studies.dispersion_figure, dispersed, "momentum"))
-
-
-def _picture(name: str, draw: Callable[..., Figure]) -> Picture:
-    """A picture with its title as text of the page, and the ``narrow`` drawing for a phone; those
-    of the first screen stand beside its headline and have no other.
-    """
-    figures = [draw(narrow=narrow) for narrow in (False, True)]
-    title = "" if name in FIRST else str(figures[0].get_label())
-    caption, described = PICTURES[name]
-    return Picture(title, caption, *(image.svg(figure, described) for figure in figures))
-
-
-EQUATIONS = (
-    "1",
-    "17",
-    "18",
-    "19",
-)  # equations of Magnus that every plan and flight rest on, as the guide numbers them
+        again.append(Download(f"{stem}.yaml", repeat.text))
+    yield Details("Input file, and how to repeat the page", tuple(again))
 
 
 def _method(compared: Comparison) -> Iterator[Block]:
@@ -583,39 +532,31 @@ def _method(compared: Comparison) -> Iterator[Block]:
         f"impulse{unequal}.{wheel}"
     )
     chosen = compared.recommended
-    topics = [guide.topic_of(number) for number in EQUATIONS]
-    scheme = (
-        guide.topic_of(chosen.scheme)
-        if chosen is not None and chosen.scheme in guide.NAMES
-        else None
-    )
-    formulas = [(topic, -1) for topic in topics]  # of an equation the last one, which is in use
-    formulas += [] if scheme is None else [(scheme, 0)]
+    # Of an equation the last formula, which is in use, of a scheme the first one.
+    formulas = [(guide.topic_of(number), -1) for number in EQUATIONS]
     lines: list[str] = []
+    symbols: dict[str, str] = {}
+    if chosen is not None and chosen.scheme in guide.NAMES:
+        formulas.append((guide.topic_of(chosen.scheme), 0))
     for topic, which in formulas:
         lines += [f"{topic.name}  {topic.summary}", topic.formulas[which].rstrip("\n"), ""]
-    yield document.Listing("Equations", "\n".join(lines))
-    yield FactList("Symbols", tuple(_symbols(topics, scheme, " ".join([*lines, "θ"]))))
+    yield Listing("Equations", "\n".join(lines))
+    listed = " ".join([*lines, "θ"])
+    for topic, which in formulas:  # each symbol once; those of the scheme as its formula has them
+        if which:
+            symbols |= {name: of for name, of in topic.rows if name.removesuffix(")") in listed}
+        else:
+            _, rest = topic.text.split(topic.formulas[0])
+            symbols[topic.name] = " ".join(rest.partition("\n###")[0].split())
+    yield FactList("Symbols", tuple(symbols.items()))
     yield Points((("", guide.SOURCE),))
-
-
-def _symbols(
-    topics: Sequence[Topic], scheme: Topic | None, listed: str
-) -> Iterator[tuple[str, str]]:
-    """Each symbol of the equations that are ``listed`` once, and those of the formula of the
-    scheme, as it has them.
-    """
-    rows = (row for topic in topics for row in topic.rows)
-    yield from {symbol: text for symbol, text in rows if symbol.removesuffix(")") in listed}.items()
-    if scheme is not None:
-        _, rest = scheme.text.split(scheme.formulas[0])
-        yield scheme.name, " ".join(rest.partition("\n###")[0].split())
 
 
 def _any_of(*schemes: str) -> Callable[[Comparison], bool]:
     return lambda compared: any(plan.scheme in schemes for plan in compared.plans)
 
 
+# beginnings of the limits of the guide that apply only to some comparisons, and to which
 CONDITIONS: dict[str, Callable[[Comparison], bool]] = {
     "The closed forms hold": lambda compared: not compared.spacecraft.inertia.symmetric,
     "Disturbances": lambda compared: bool(compared.spacecraft.disturbances),
@@ -624,7 +565,6 @@ CONDITIONS: dict[str, Callable[[Comparison], bool]] = {
     "Small angles are magnified": lambda _: False,
     "`two-pulse`": _any_of("two-pulse", "half-cone", "rhumb-line"),
 }
-"""Beginnings of the limits of the guide that apply only to some comparisons, and to which."""
 
 
 def assumptions(compared: Comparison) -> Iterator[str]:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from nutdamp.planning.screening import Dispersion
 
 
+# Functions of results by the class of a result and a subject, see `nutdamp.common.results.view`.
 VIEWS = {
     "object.save": "page.results:save",
     "object.write": "page.results:write",
@@ -90,7 +91,6 @@ VIEWS = {
     "Budget.figure": "figures.signals:budget_figure",
     "Budget.screen": "views.loop:budget_screen",
 }
-"""Functions of results, see `nutdamp.common.results.view`."""
 
 
 def remarks(result: Plan | Comparison) -> tuple[str, ...]:
@@ -145,6 +145,7 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
     """
     from nutdamp.figures import overview, studies
 
+    named = units.instance("name", name, str, "the name of a figure")
     judged = None if isinstance(result, Flight) else result.verdict
     others: tuple[Verdict, ...] = ()
     if isinstance(result, Comparison):
@@ -153,26 +154,23 @@ def figure(result: Plan | Comparison | Flight | Simulation, name: str = "overvie
         others = result.others
         result = result.recommended
     box = None
+    names: tuple[str, ...] = overview.FIGURES
     if isinstance(result, Plan):
         assert judged is not None
         feasible(result)
-        if name == "box":
-            return studies.acceptance_figure(judged, others)
         box = partial(studies.acceptance, judged=judged, others=others)
+        names = (*names, "box")
         flight, track = overview.shown(result)
     elif isinstance(result, Flight):
         flight = result
         track = result.sampled(result.samples, overview.until(result))
     else:
         flight, track = result.shown, result.pictured
-    named = units.instance("name", name, str, "the name of a figure")
-    try:
-        return overview.flight_figure(named, flight, track, judged, box=box)
-    except KeyError:
-        names = [*overview.FIGURES] if box is None else [*overview.FIGURES, "box"]
-        raise BadRequest(
-            f"there is no figure {name!r}; expected one of {', '.join(names)}"
-        ) from None
+    if named not in names:
+        raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(names)}")
+    if judged is not None and named == "box":
+        return studies.acceptance_figure(judged, others)
+    return overview.flight_figure(named, flight, track, judged, box=box)
 
 
 def save(result: object, path: str | PathLike[str]) -> None:
@@ -249,19 +247,17 @@ def html(
 
 
 def _blocks(result: Spacecraft | Plan | Flight | Comparison | Dispersion) -> Iterator[Block]:
-    from nutdamp.page.document import FactList, Prose, facts_of, sheet
+    from nutdamp.page.document import FactList, Prose, fact_list, sheet
     from nutdamp.views import dispersion, verdict
-    from nutdamp.views.decisions import derived_table
+    from nutdamp.views.decisions import derived_facts
 
     if isinstance(result, Spacecraft):
-        yield facts_of(result.name, derived_table(result))
+        yield fact_list(result.name, derived_facts(result))
         return
     if isinstance(result, Flight):
-        rows = tuple(
-            (name.replace("_", " "), degrees(getattr(result.residual, name)))
-            for name in ("nutation", "body_cone", "space_cone", "momentum_shift")
-        )
-        yield FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
+        names = ("nutation", "body_cone", "space_cone", "momentum_shift")
+        left = [(name.replace("_", " "), degrees(getattr(result.residual, name))) for name in names]
+        yield FactList(f"{result.spacecraft.name}: {_summary(result)}", tuple(left))
         return
     judged = result.verdict
     about = "".join(verdict.headline(judged, result if isinstance(result, Comparison) else None))

@@ -1,8 +1,8 @@
 """Body rates of symmetric bodies under constant and turning torques in closed form, Magnus 1970
-(8)-(14), (23)-(27).
+(11)-(14), (23)-(27).
 
 Without dissipation they are linear in their drive whatever the attitude: ω' = -iaω3 ω + M/A with ω3
-linear in time, Magnus 1970 (1).
+constant, Magnus 1970 (1). Torques in steps, with an axial part, are those of `motion.polynomials`.
 """
 
 from __future__ import annotations
@@ -12,65 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import gauss_legendre
-
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-
-PANEL = 2.0  # phase in rad of one Gauss-Legendre panel; ten nodes then err by less than a rounding
-
-
-def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
-    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by
-    Gauss-Legendre panels.
-
-    Bödewadt writes it with Fresnel's integrals, which cancel as bend -> 0.
-    """
-    slope, bend, length = (
-        np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length)
-    )
-    # The phase may turn back where slope + 2 bend s = 0; this bounds its total variation.
-    variation = np.abs(slope) * np.abs(length) + np.abs(bend) * np.square(length)
-    counts = np.maximum(np.ceil(variation / PANEL), 1.0).astype(int)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    number = np.arange(len(owner)) - firsts[owner]
-    width = length[owner] / counts[owner]
-    nodes, weights = gauss_legendre(10)
-    s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
-    phase = (slope[owner][:, None] + bend[owner][:, None] * s) * s
-    panels = 0.5 * width * (np.exp(1j * phase) @ weights)
-    return np.asarray(np.add.reduceat(panels, firsts))
-
-
-def stepwise_torque(
-    times: Array, omega0: complex, spin0: float, A: float, C: float, edges: Array, torques: Array
-) -> tuple[ComplexArray, Array]:
-    """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at
-    any angle.
-
-    ``times`` (n,) s within ``edges`` (k+1,) s ascending; ``omega0``, ``spin0`` in rad/s are those
-    at edges[0]; ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
-    """
-    edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
-    times = np.asarray(times, dtype=float)
-    a = (A - C) / A
-    spin_rates = torques[:, 2] / C
-    lengths = np.diff(edges)
-    spins = spin0 + np.concatenate([[0.0], np.cumsum(spin_rates * lengths)])
-    alphas = np.concatenate([[0.0], np.cumsum((spins[:-1] + 0.5 * spin_rates * lengths) * lengths)])
-    transverse = (torques[:, 0] + 1j * torques[:, 1]) / A
-
-    def gained(step: NDArray[np.intp], since: Array) -> ComplexArray:
-        turned = phase_integral(a * spins[step], 0.5 * a * spin_rates[step], since)
-        return np.asarray(transverse[step] * np.exp(1j * a * alphas[step]) * turned)
-
-    sums = omega0 + np.concatenate([[0.0], np.cumsum(gained(np.arange(len(lengths)), lengths))])
-    step = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(lengths) - 1)
-    since = times - edges[step]
-    spin = spins[step] + spin_rates[step] * since
-    alpha = alphas[step] + 0.5 * (spins[step] + spin) * since
-    return (sums[step] + gained(step, since)) * np.exp(-1j * a * alpha), spin
 
 
 def rotating_torques(

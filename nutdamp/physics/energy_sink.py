@@ -45,7 +45,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.numerics import TINY
-from nutdamp.physics import attitude
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -78,7 +77,7 @@ def damper(A: Any, C: Any, wheel: Any, size: Any, sense: float) -> tuple[Any, An
     """Shares u and v of the law by |H| = ``size`` and the end ``sense`` of axis 3: (1, 0) without a
     wheel.
     """
-    if not (wheel if isinstance(wheel, float) else np.any(wheel)):
+    if not np.any(wheel):
         return 1.0, 0.0
     by_body, by_wheel = (C - A) / A * size, sense * wheel
     small = by_body + by_wheel + TINY
@@ -86,54 +85,32 @@ def damper(A: Any, C: Any, wheel: Any, size: Any, sense: float) -> tuple[Any, An
 
 
 def course(
-    growth: float,
-    cosine: float,
-    sine_squared: float,
-    time: float,
-    shares: tuple[Any, Any] = (1.0, 0.0),
+    growth: float, cosine: Any, sine_squared: Any, time: Any, shares: tuple[Any, Any] = (1.0, 0.0)
 ) -> SinkEffect:
     """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and
     ``sine_squared``.
+
+    Numbers, or arrays that broadcast, real or complex (a complex step gives derivatives).
     """
-    if shares[1] != 0.0:
+    if np.any(shares[1]):
         return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, time)
     exponent = growth * time
-    clipped = max(-FOR_EVER, min(exponent, FOR_EVER))
-    return _course(math, math.asinh, cosine, sine_squared, time, exponent, clipped)
-
-
-def courses(
-    growth: float, cosine: Any, sine_squared: Any, times: Any, shares: tuple[Any, Any] = (1.0, 0.0)
-) -> SinkEffect:
-    """`course` for arrays that broadcast, real or complex (a complex step gives derivatives)."""
-    if np.any(shares[1]):
-        return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, times)
-    exponent = growth * np.asarray(times)
-    clipped = np.clip(exponent, -FOR_EVER, FOR_EVER)
-    return _course(np, np.arcsinh, cosine, sine_squared, times, exponent, clipped)
-
-
-def _course(
-    module: Any, asinh: Any, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any
-) -> SinkEffect:
-    """`course` by the functions of a ``module``;
-    ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`.
-    """
-    growing = module.exp(x)
+    x = np.maximum(-FOR_EVER, np.minimum(exponent, FOR_EVER))
+    growing = np.exp(x)
     squared = cosine * cosine
-    size = module.sqrt(squared + sine_squared * growing * growing)
-    grown = module.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)
+    size = np.sqrt(squared + sine_squared * growing * growing)
+    grown = np.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)
     moving = time * ((x + TINY) / (exponent + TINY))
     stretched = (
-        moving * (module.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)
+        moving * (np.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)
     )  # asinh(c κ stretched)/(c κ)
-    swing = cosine * 2.0 * module.sinh(x) / (1.0 + size) + TINY
+    swing = cosine * 2.0 * np.sinh(x) / (1.0 + size) + TINY
     return SinkEffect(
         transverse=growing / size,
         along=cosine / size,
-        travel=cosine * (stretched * asinh(swing) / swing + (time - moving) / size),
+        travel=cosine * (stretched * np.arcsinh(swing) / swing + (time - moving) / size),
         cosine=grown,
-        sine=0.5 * cosine * module.expm1(x) / (size * grown),
+        sine=0.5 * cosine * np.expm1(x) / (size * grown),
     )
 
 
@@ -244,23 +221,22 @@ def time_to_angle(growth: float, begin: float, end: float, shares: tuple[float, 
 
 
 def coast(
-    A: float,
-    C: float,
+    A: Any,
+    C: Any,
     growth: float,
-    omega: complex,
-    spin: float,
+    omega: Any,
+    spin: Any,
     time: Any,
-    wheel: float = 0.0,
+    wheel: Any = 0.0,
     sense: float = 1.0,
 ) -> SinkEffect:
-    """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start,
+    """`course` of symmetric bodies from their rates ``omega`` = ω1 + iω2 and ``spin`` at the start,
     rad/s.
     """
-    first, second, third, size = _direction(A, C, omega, spin, wheel)
-    effect_of = courses if isinstance(time, np.ndarray) else course
-    return effect_of(
-        growth, third, first * first + second * second, time, damper(A, C, wheel, size, sense)
-    )
+    across, along = A * np.abs(omega), C * spin + wheel
+    size = np.hypot(across, along) + TINY  # at rest, as of pure spin
+    shares = damper(A, C, wheel, size, sense)
+    return course(growth, (along + TINY) / size, np.square(across / size), time, shares)
 
 
 def rates_on_arc(
@@ -283,24 +259,11 @@ def rates_on_arc(
     if growth == 0.0:
         rate = (A - C) / A * (spin + offset) - offset
         return np.asarray(omega * np.exp(-1j * (rate * times))), np.broadcast_to(spin, times.shape)
-    across, along = A * A * (omega.real**2 + omega.imag**2), C * (spin + offset)
-    size = np.sqrt(across + along * along) + TINY
-    effect = courses(
-        growth, along / size, across / (size * size), times, damper(A, C, wheel, size, sense)
-    )
+    effect = coast(A, C, growth, omega, spin, times, wheel, sense)
+    size = np.hypot(A * np.abs(omega), C * (spin + offset))
     turned = (A - C) / A * size / C * effect.travel - offset * times
-    return np.asarray(
-        omega * np.exp(-1j * turned) * effect.transverse
-    ), size * effect.along / C - offset
-
-
-def _direction(
-    A: float, C: float, omega: complex, spin: float, wheel: float
-) -> tuple[float, float, float, float]:
-    """Unit vector of H in body axes, axis 3 for a body at rest, and |H|."""
-    h1, h2, h3 = attitude.angular_momentum(A, C, omega, spin, wheel).tolist()
-    size = math.hypot(h1, h2, h3)
-    return (h1 / size, h2 / size, h3 / size, size) if size > 0.0 else (0.0, 0.0, 1.0, 0.0)
+    decayed = omega * np.exp(-1j * turned) * effect.transverse
+    return np.asarray(decayed), size * effect.along / C - offset
 
 
 # --- the sink as Taylor series
@@ -331,9 +294,10 @@ class SinkSeries:
     ) -> None:
         self.growth, self.wheel, self.sense = growth, wheel, sense
         self.parts, self.floor = parts, floor
-        self.with_wheel = bool(np.any(self.wheel))
-        self.by_wheel = [0.5 * (part[0] + part[1]) for part in parts]
-        self.by_body = [part[2] - A for part, A in zip(parts, self.by_wheel, strict=True)]
+        self.by_body, self.by_wheel = [1.0], [0.0]  # of H3 and of h in q
+        if np.any(wheel):
+            self.by_wheel = [0.5 * (part[0] + part[1]) for part in parts]
+            self.by_body = [part[2] - A for part, A in zip(parts, self.by_wheel, strict=True)]
         shape = parts[0].shape
         self.momentum, self.slip = np.zeros((2, orders, *shape))  # H and s
         # |H|², |H|, the denominator of q, and q
@@ -356,19 +320,16 @@ class SinkSeries:
             self.squares[k] = np.einsum("kcn,kcn->n", momentum, momentum[::-1])
         if k == 0:
             self.squares[0] += self.floor
-        above, self.below[k] = momentum[k, 2], self.squares[k]
-        if self.with_wheel:
-            if k == 0:
-                self.size[0] = np.sqrt(self.squares[0])
-            else:
-                between = _product(self.size[1:k], self.size[1:k])
-                self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
-            above = self.by_wheel[k] * self.wheel if k < len(self.parts) else 0.0
-            self.below[k] = 0.0
-            for order, apart in enumerate(self.by_body[: k + 1]):
-                above = above + apart * momentum[k - order, 2]
-                by_wheel = self.sense * self.wheel * self.by_wheel[order]
-                self.below[k] += apart * self.squares[k - order] + by_wheel * self.size[k - order]
+        if k == 0:
+            self.size[0] = np.sqrt(self.squares[0])
+        else:
+            between = _product(self.size[1:k], self.size[1:k])
+            self.size[k] = 0.5 * (self.squares[k] - between) / self.size[0]
+        above = self.by_wheel[k] * self.wheel if k < len(self.by_wheel) else 0.0
+        for order, apart in enumerate(self.by_body[: k + 1]):
+            above = above + apart * momentum[k - order, 2]
+            by_wheel = self.sense * self.wheel * self.by_wheel[order]
+            self.below[k] += apart * self.squares[k - order] + by_wheel * self.size[k - order]
         before = _product(self.below[1 : k + 1], self.quotient[:k])
         quotient = self.quotient[: k + 1]
         quotient[k] = (above - before) / self.below[0]

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from nutdamp.physics.attitude import angle_of_parts, rotate
 from nutdamp.physics.energy_sink import damper
-from nutdamp.physics.motion import MotionStretch, advance, between_edges, polynomials
-from nutdamp.physics.series import Polynomial
+from nutdamp.physics.motion import MotionStretch, advance, between_edges, pieces
 
 Array = NDArray[np.float64]
 
@@ -31,51 +30,13 @@ ROWS = 24  # steps per turn of the axis, where it is followed in steps
 
 CIRCLE = 2.0 * math.pi
 
+BACK = np.array([[1.0], [-1.0], [-1.0], [-1.0]])  # factors of the inverse turn
+
 OBLIQUITY = math.radians(23.43928)  # obliquity of the ecliptic at J2000.0
 ABERRATION = 20.4898 / 3600.0  # mean aberration of the Sun, deg (Meeus, 25.10)
 
 TILTING, NODE = math.radians(0.013056), math.radians(174.876)
 """Tilt of the ecliptic per century, and the longitude of its axis."""
-
-
-class DenseStretch(NamedTuple):
-    """Motion from a ``start`` for ``length`` (n,) s: by a ``polynomial``, or in closed form."""
-
-    start: MotionStretch
-    length: Array
-    polynomial: Polynomial | None = None
-
-    def at(self, way: Array, cases: Any) -> MotionStretch:
-        """Motion of ``cases`` after a ``way`` (m,), as a share of the length."""
-        here = self.start.some(cases)
-        since = here.since + way * self.length[cases]
-        if self.polynomial is None:
-            return here.moved(since)
-        rates, quaternion = self.polynomial.at(way, cases)
-        return here._replace(since=since, rates=rates, quaternion=quaternion)
-
-    def steps(self, count: int) -> Iterator[MotionStretch]:
-        """Motion at the end of each of ``count`` steps of equal length."""
-        ways = np.arange(1, count + 1) / count
-        times = self.start.since + ways[:, None] * self.length
-        if self.polynomial is None:
-            yield from map(self.start.moved, times)
-            return
-        for since, rates, quaternion in zip(times, *self.polynomial.along(ways), strict=True):
-            yield self.start._replace(since=since, rates=rates, quaternion=quaternion)
-
-
-def pieces(here: MotionStretch, duration: Array) -> Iterator[DenseStretch]:
-    """Motion that `advance` makes with these arguments, which stay as they are, one piece after the
-    other.
-    """
-    if here.torque is None and here.bodies.free:
-        yield DenseStretch(here, duration)
-        return
-    for piece in polynomials(here, duration):
-        terms = piece.terms[0]
-        start = here._replace(since=piece.start, rates=terms[4:], quaternion=terms[:4])
-        yield DenseStretch(start, piece.duration, piece)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,8 +163,8 @@ class AxisWatch:
         self._record(here, ...)
         before = self._look(here)
         for piece in pieces(here, duration):
-            count = max(math.ceil(float(np.max(pace * piece.length)) * ROWS / CIRCLE), 1)
-            looks = np.array([before, *(self._look(here := step) for step in piece.steps(count))])
+            count = max(math.ceil(float(np.max(pace * piece.duration)) * ROWS / CIRCLE), 1)
+            looks = np.array([before, *(self._look(here := step) for step in piece.along(count))])
             before = looks[-1]
             for cosines, rates in looks.transpose(1, 2, 0, 3):
                 steps, cases = np.nonzero(
@@ -211,7 +172,8 @@ class AxisWatch:
                 )  # in between it comes nearest, or goes farthest
                 if len(cases):
                     slopes = (
-                        rates[steps + late, cases] * piece.length[cases] / count for late in (0, 1)
+                        rates[steps + late, cases] * piece.duration[cases] / count
+                        for late in (0, 1)
                     )
                     way = _extreme(cosines[steps + 1, cases] - cosines[steps, cases], *slopes)
                     self._record(piece.at((steps + way) / count, cases), cases)
@@ -249,7 +211,7 @@ class AxisWatch:
 
     def _seen(self, here: MotionStretch, cases: Any) -> Iterator[Array]:
         """Directions (3, n) in body axes, of some of the observed cases."""
-        back = here.quaternion * np.array([[1.0], [-1.0], [-1.0], [-1.0]])
+        back = here.quaternion * BACK
         for number, directions in enumerate(self.directions[:, :, self.rows]):
             if number == self.momentum:
                 momentum = here.bodies.momentum(here.rates)
@@ -601,15 +563,7 @@ def ahead(
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a
     `SunPulseClock`, ``sun`` (3, n) or with the mount below it (12, n).
     """
-    w, x, y, z = quaternion
-    s1, s2, s3 = sun[:3]
-    # The Sun as the body sees it: turned by the conjugate quaternion.
-    i, j, k = z * s2 - y * s3, x * s3 - z * s1, y * s1 - x * s2
-    s1, s2, s3 = (
-        s1 + 2.0 * (w * i + z * j - y * k),
-        s2 + 2.0 * (w * j + x * k - z * i),
-        s3 + 2.0 * (w * k + y * i - x * j),
-    )
+    s1, s2, s3 = _rotated(quaternion * BACK, sun[:3])  # as the body sees it
     first, second, third = rates
     if len(sun) > 3:
         mount = sun[3:].reshape(3, 3, -1)

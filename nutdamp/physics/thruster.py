@@ -12,12 +12,13 @@ import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import gauss_legendre
+from nutdamp.common.numerics import TINY, gauss_legendre
 
 SMALL = 1e-9  # relative pressure step for the slope of a table
 
@@ -80,8 +81,7 @@ class Tank:
         At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure
         is V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
         """
-        many = np.ndim(used) or np.ndim(self.propellant)
-        used = np.minimum(used, self.propellant) if many else min(used, self.propellant)
+        used = np.minimum(used, self.propellant)
         return self.pressure / (
             1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant
         )
@@ -140,13 +140,9 @@ class Tank:
         propellant lasts.
         """
         left = self.propellant - used
-        many = np.ndim(used) or np.ndim(more) or np.ndim(self.propellant)
-        if not many:
-            return 1.0 if more <= left or more == 0.0 else max(left, 0.0) / more
-        lasts = np.real(more) <= np.real(left)
-        return np.where(
-            lasts, 1.0, np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more)
-        )
+        lasts = np.real(more) <= np.maximum(np.real(left), 0.0)
+        rest = np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more)
+        return np.where(lasts, 1.0, rest)[()]
 
     def isp_after(self, used: Any) -> Any:
         """Specific impulse, s; None where the thrusters have their own."""
@@ -229,30 +225,36 @@ class Opened(NamedTuple):
 
     @property
     def acts(self) -> tuple[Any, Any, Any]:
-        """Effective on-time, centroid and spread (of the rectangle with the same second moment),
-        s.
-        """
-        first, second, third, last = self.corners
-        pieces = (  # area, centroid, variance
-            (
-                0.5 * self.level * (second - first),
-                (first + 2.0 * second) / 3.0,
-                (second - first) ** 2 / 18.0,
-            ),
-            (self.level * (third - second), 0.5 * (second + third), (third - second) ** 2 / 12.0),
-            (
-                0.5 * self.level * (last - third),
-                (2.0 * third + last) / 3.0,
-                (last - third) ** 2 / 18.0,
-            ),
+        """`action` of its pieces."""
+        return action(
+            [
+                (begin, begin + length, level * (1.0 - lean), level * (1.0 + lean))
+                for begin, length, level, lean in self.pieces
+            ]
         )
-        total = sum(area for area, _, _ in pieces)
-        whole = np.where(total == 0.0, 1.0, total)
-        centroid = sum(area * middle for area, middle, _ in pieces) / whole
-        variance = (
-            sum(area * (own + (middle - centroid) ** 2) for area, middle, own in pieces) / whole
-        )
-        return total, np.where(total == 0.0, first, centroid), np.sqrt(12.0 * variance)
+
+
+def action(ramps: Sequence[tuple[Any, Any, Any, Any]]) -> tuple[Any, Any, Any]:
+    """Effective on-time, centroid and spread, s, of thrust by its ``ramps`` (as of `Ramp`), numbers
+    or arrays; without thrust the centroid is the begin of the first.
+
+    The spread is the length of the rectangular pulse with the same second moment about the centroid
+    for its impulse.
+    """
+    if not ramps:
+        return 0.0, 0.0, 0.0
+    pieces = []
+    for begin, end, first, last in ramps:
+        length = end - begin
+        double = first + last + TINY
+        middle = begin + length * (first + 2.0 * last) / (3.0 * double)
+        own = length**2 * (1.0 + 2.0 * (first / double) * (last / double)) / 18.0
+        pieces.append((0.5 * length * double, middle, own))
+    total = sum(area for area, _, _ in pieces)
+    whole = total + TINY
+    centroid = (sum(area * middle for area, middle, _ in pieces) + TINY * ramps[0][0]) / whole
+    parts = (area * (own + (middle - centroid) ** 2) for area, middle, own in pieces)
+    return total, centroid, (12.0 * sum(parts) / whole) ** 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,22 +284,15 @@ class Trapezoid:
         )  # from the first thrust to the beginning of its fall
         if opened <= 0.0 or on_time <= 0.0:
             return NOTHING
-        rise, fall = self.rise_time, self.fall_time
-        level = 1.0 if opened >= rise else opened / rise
-        flat = max(opened - rise, 0.0)
-        rising = opened - flat
-        falling = level * fall
-        areas = (0.5 * level * rising, flat, 0.5 * level * falling)
-        total = math.fsum(areas)
-        arms = (rising + 0.5 * flat), (opened + falling / 3.0)
-        moment = math.fsum((areas[0] * 2.0 * rising / 3.0, areas[1] * arms[0], areas[2] * arms[1]))
-        ramps = []
-        begin = self.open_delay
-        for length, first, last in ((rising, 0.0, level), (flat, 1.0, 1.0), (falling, level, 0.0)):
-            if begin + length > begin:
-                ramps.append(Ramp(begin, begin + length, first, last))
-                begin += length
-        return Thrust(total, self.open_delay + moment / total, tuple(ramps))
+        level = 1.0 if opened >= self.rise_time else opened / self.rise_time
+        ends = (0.0, level * self.rise_time, opened, opened + level * self.fall_time)
+        corners = [self.open_delay + end for end in ends]
+        spans = pairwise(zip(corners, (0.0, level, level, 0.0), strict=True))
+        ramps = [
+            Ramp(begin, end, first, last) for (begin, first), (end, last) in spans if end > begin
+        ]
+        effective, centroid, _ = action(ramps)
+        return Thrust(effective, centroid, tuple(ramps))
 
     def opened(
         self, on_time: float, open_delay: Any, close_delay: Any, rise_time: Any, fall_time: Any
@@ -476,21 +471,3 @@ def shape_factor(
         turned += given * length + 0.5 * ramp.first * length**2 + slope * length**3 / 6.0
         given += ramp.impulse
     return total / given
-
-
-def spread(ramps: Sequence[Ramp], centroid: float) -> float:
-    """Length (s) of the rectangular pulse that has the same second moment about the ``centroid``
-    for its impulse.
-    """
-    second, total = 0.0, 0.0
-    for ramp in ramps:
-        length = ramp.end - ramp.begin
-        begin = ramp.begin - centroid
-        slope = (ramp.last - ramp.first) / length
-        # ∫ (first + slope s) (begin + s)² ds
-        second += ramp.first * (begin * begin * length + begin * length**2 + length**3 / 3.0)
-        second += slope * (
-            0.5 * begin * begin * length**2 + 2.0 * begin * length**3 / 3.0 + 0.25 * length**4
-        )
-        total += ramp.impulse
-    return math.sqrt(12.0 * max(second, 0.0) / total) if total > 0.0 else 0.0

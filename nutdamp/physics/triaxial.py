@@ -19,7 +19,6 @@ divides by a vanishing quantity.
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -27,17 +26,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from nutdamp.common.numerics import TINY
 from nutdamp.physics import attitude
-from nutdamp.physics import body as rigid_body
+from nutdamp.physics import inertia as principal_moments
 
 Array = NDArray[np.float64]
 
 NEGLIGIBLE = 1e-140
-"""Fraction of the largest rate below which a rate counts as zero, as does a sine: its square would
-underflow.
-"""
+"""rad/s below which a rate counts as zero, as does a sine: its square would underflow."""
 
-# share of two terms of a difference below which it is taken in fractions, to keep all digits
-CANCELS = 0.1
 # largest number of steps to an arithmetic-geometric mean; from the smallest number it takes twelve
 MEANS = 40
 MODES_REACH = (
@@ -50,13 +45,11 @@ def free_rates(moments: ArrayLike, rates0: ArrayLike, times: ArrayLike) -> Array
     motion.
 
     ``moments`` (I1, I2, I3) in kg m², in any order, equal ones included. Errors stay below 1e-12 of
-    |ω| over 100 periods, up to the separatrix and on it, with the given numbers taken as exact;
-    their uncertainty moves the phase by about 1/(1 - m) times as much each period, as it does for
-    the spacecraft itself.
+    |ω| over 100 periods; near the separatrix a rounding of the numbers moves the phase by about
+    1/(1 - m) times as much each period, as it does for the spacecraft itself.
     """
     polhodes = _polhodes(_column(moments), _column(rates0))
-    scaled = _rates(polhodes, polhodes.rate_unit * np.asarray(times, dtype=float))
-    return (polhodes.rate_unit * polhodes.in_body(scaled)).T
+    return polhodes.in_body(_rates(polhodes, np.asarray(times, dtype=float))).T
 
 
 def free_attitude(
@@ -86,7 +79,6 @@ def coasts(moments: Array, rates0: Array, quaternion0: Array, times: Array) -> t
     of the angle turned, below 1e-11 rad over 100 periods.
     """
     polhodes = _polhodes(moments, rates0)
-    scaled = polhodes.rate_unit * times
     start = polhodes.moments * polhodes.rates
     size = np.sqrt(np.sum(start * start, axis=0)) + TINY
     e = np.zeros_like(start)
@@ -95,8 +87,8 @@ def coasts(moments: Array, rates0: Array, quaternion0: Array, times: Array) -> t
     # Of χ the part that swings about 2T t/|H| is split off: its factor H² - 2T I_c vanishes with
     # the nutation.
     swing = np.copysign(polhodes.about_c / size, polhodes.moments[0] - polhodes.moments[2])
-    chi = twice_energy / size * scaled + swing * _swing(polhodes, size, scaled)
-    rates = _rates(polhodes, scaled)
+    chi = twice_energy / size * times + swing * _swing(polhodes, size, times)
+    rates = _rates(polhodes, times)
     end = polhodes.moments * rates
     toward = polhodes.in_body(e)
     cosine, sine = np.cos(0.5 * chi), np.sin(0.5 * chi)
@@ -110,8 +102,7 @@ def coasts(moments: Array, rates0: Array, quaternion0: Array, times: Array) -> t
         constant = np.array([np.cos(half), *(np.sin(half) / speed * rates0)])
         turns = np.where(still, constant, turns)
     result: Array = np.array(attitude.product(quaternion0, turns))
-    later = polhodes.rate_unit * polhodes.in_body(rates)
-    return later, result / np.sqrt(np.sum(result * result, axis=0))
+    return polhodes.in_body(rates), result / np.sqrt(np.sum(result * result, axis=0))
 
 
 def body_nutation_rate(moments: ArrayLike, spin: float, wheel: float = 0.0) -> float:
@@ -128,7 +119,7 @@ def body_nutation_rate(moments: ArrayLike, spin: float, wheel: float = 0.0) -> f
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
     leading = ((first - third) * spin - wheel) / first
     square = leading * (((second - third) * spin - wheel) / second)
-    if square < 0.0 and (wheel != 0.0 or rigid_body.axis_class(moments) == "intermediate"):
+    if square < 0.0 and (wheel != 0.0 or principal_moments.axis_class(moments) == "intermediate"):
         raise ValueError("spin about the axis of the middle moment has no nutation rate")
     return math.copysign(math.sqrt(max(square, 0.0)), leading)
 
@@ -143,7 +134,7 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     if polhodes.pace[0] == 0.0 or polhodes.complement[0] == 0.0:
         return math.inf
     quarter = 0.5 * math.pi / _means(polhodes.complement)[1]
-    return float((4.0 * quarter / (polhodes.pace * polhodes.rate_unit))[0])
+    return float((4.0 * quarter / polhodes.pace)[0])
 
 
 def widest_cones(
@@ -194,17 +185,14 @@ def _first_zero(value: Array, slope: Array, bend: Array) -> Array:
     )  # at rest there, even if not for long
 
 
-class _ScaledPolhodes(NamedTuple):
-    """Paths of ω in n bodies, in their axes a, b and c; moments and rates scaled by powers of two
-    against under- and overflow.
-    """
+class _Polhodes(NamedTuple):
+    """Paths of ω in n bodies, in their axes a, b and c."""
 
     axes: NDArray[np.intp]  # (3, n)
     moments: Array  # (3, n)
     rates: Array  # (3, n)
     slopes: Array  # (3, n), dω/dt
-    rate_unit: Array  # (n,), as all below
-    largest: Array  # D
+    largest: Array  # D, (n,) as all below
     pace: Array  # p; zero where the rates are constant
     complement: Array  # 1 - m
     about_c: Array  # P
@@ -214,26 +202,16 @@ class _ScaledPolhodes(NamedTuple):
         return np.take_along_axis(vectors, np.argsort(self.axes, axis=0), axis=0)
 
 
-def _polhodes(moments: Array, rates0: Array) -> _ScaledPolhodes:
+def _polhodes(moments: Array, rates0: Array) -> _Polhodes:
     """Paths of bodies of ``moments`` (3, n) through ``rates0`` (3, n)."""
-    inertia = moments / _unit(moments)
-    rate_unit = _unit(rates0)
-    rates = rates0 / rate_unit
-    rates = np.where(np.abs(rates) < NEGLIGIBLE, 0.0, rates)
-    order = np.argsort(inertia, axis=0, kind="stable")
-    inertia, sorted_rates = (np.take_along_axis(each, order, axis=0) for each in (inertia, rates))
+    rates = np.where(np.abs(rates0) < NEGLIGIBLE, 0.0, rates0)
+    order = np.argsort(moments, axis=0, kind="stable")
+    inertia, sorted_rates = (np.take_along_axis(each, order, axis=0) for each in (moments, rates))
     # H² - 2T I_b, positive about the axis of the largest moment, zero on the separatrix
     least, middle, largest = inertia
     ups = largest * (largest - middle) * sorted_rates[2] ** 2
     downs = least * (middle - least) * sorted_rates[0] ** 2
     balance = ups - downs
-    for case in np.flatnonzero(np.abs(balance) < CANCELS * (ups + downs)):
-        i_least, i_middle, i_most, w_least, _, w_most = (
-            Fraction(float(value)) for value in (*inertia[:, case], *sorted_rates[:, case])
-        )
-        balance[case] = float(
-            i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2
-        )
     reverse = balance < 0.0
     axes, inertia, rates = (
         np.where(reverse, each[::-1], each) for each in (order, inertia, sorted_rates)
@@ -252,17 +230,11 @@ def _polhodes(moments: Array, rates0: Array) -> _ScaledPolhodes:
     pace = np.where(moves, top * np.sqrt(d_ca / a * (d_cb / b)), 0.0)
     whole = np.where(moves, c * d_cb * top**2, 1.0)
     complement = np.where(moves, np.minimum(np.abs(balance) / whole, 1.0), 1.0)
-    return _ScaledPolhodes(axes, inertia, rates, slopes, rate_unit, top, pace, complement, about_c)
+    return _Polhodes(axes, inertia, rates, slopes, top, pace, complement, about_c)
 
 
-def _unit(values: Array) -> Array:
-    """Power of two (n,) near the largest value of each (3, n): dividing by it rounds nothing."""
-    exponents: NDArray[np.intc] = np.frexp(np.max(np.abs(values), axis=0))[1] - 1
-    return np.asarray(np.ldexp(1.0, exponents))
-
-
-def _rates(polhodes: _ScaledPolhodes, times: Array) -> Array:
-    """Scaled rates (3, ...) about a, b, c at scaled times: addition theorems, with the amplitudes
+def _rates(polhodes: _Polhodes, times: Array) -> Array:
+    """Rates (3, ...) about a, b, c at ``times``: addition theorems, with the amplitudes
     written as dω/dt at t = 0.
 
     ω_a(t) = (ω_a cn + ω_a' sn dn/p)/N, ω_b(t) = (ω_b cn dn + ω_b' sn/p)/N, ω_c(t) = (ω_c dn + ω_c'
@@ -289,8 +261,8 @@ def _rates(polhodes: _ScaledPolhodes, times: Array) -> Array:
     return np.where(moves, result, polhodes.rates.reshape(shape))
 
 
-def _swing(polhodes: _ScaledPolhodes, size: Array, times: Array) -> Array:
-    """∫ |ω_c|/(|H| + I_c |ω_c|) dt from 0 to scaled ``times``."""
+def _swing(polhodes: _Polhodes, size: Array, times: Array) -> Array:
+    """∫ |ω_c|/(|H| + I_c |ω_c|) dt from 0 to ``times``."""
     split = polhodes.complement == 0.0
     if np.all(split):
         return _swing_on_separatrix(polhodes, size, times)
@@ -321,7 +293,7 @@ def _swing(polhodes: _ScaledPolhodes, size: Array, times: Array) -> Array:
     return np.asarray(total)
 
 
-def _swing_on_separatrix(polhodes: _ScaledPolhodes, size: Array, times: Array) -> Array:
+def _swing_on_separatrix(polhodes: _Polhodes, size: Array, times: Array) -> Array:
     """`_swing` without a period: ω_c = D sech u, so that the integrand is D/(|H|(cosh u + ε)), ε =
     I_c D/|H|.
 

@@ -14,6 +14,7 @@ import numpy as np
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import driven, precession, response
+from nutdamp.physics import inertia as principal_moments
 from nutdamp.schemes import block_model
 from nutdamp.schemes.block_model import acts
 from nutdamp.spacecraft.constraints import (
@@ -165,9 +166,11 @@ def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:
 
 
 def mounting_angle(spacecraft: Spacecraft) -> float:
-    """`body.mounting_angle` of the spacecraft, rad."""
+    """`inertia.mounting_angle` of the spacecraft, rad."""
     inertia, rate = spacecraft.inertia, spacecraft.transverse_rate
-    return rigid_body.mounting_angle(inertia.A, inertia.C, rate, spacecraft.spin, inertia.wheel)
+    return principal_moments.mounting_angle(
+        inertia.A, inertia.C, rate, spacecraft.spin, inertia.wheel
+    )
 
 
 def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
@@ -266,30 +269,30 @@ def consequences(spacecraft: Spacecraft) -> Iterator[Consequence]:
 class SpinAxis(NamedTuple):
     """Principal axis 3 of inertia.
 
-    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`;
-    ``tilt`` rad against the third axis of the file; ``rates`` in the body, despun and inertially,
-    K(7), K(10), K(13), rad/s.
+    ``kind`` of `inertia.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of
+    `inertia.growth`; ``tilt`` rad against the third axis of the file; ``rates`` in the body, despun
+    and inertially, K(7), K(10), K(13), rad/s.
     """
 
     kind: str
     exponent: float
     growth_time: float
     tilt: float
-    rates: rigid_body.NutationRates
+    rates: principal_moments.NutationRates
 
 
 def spin_axis(spacecraft: Spacecraft) -> SpinAxis:
     """Class, stability and nutation rates of the spin axis."""
     inertia, spin = spacecraft.inertia, spacecraft.spin
-    kind = rigid_body.axis_class(inertia.moments)
-    grows = rigid_body.growth(inertia.moments, spin, inertia.wheel)
-    rates = rigid_body.nutation_rates(
+    kind = principal_moments.axis_class(inertia.moments)
+    grows = principal_moments.growth(inertia.moments, spin, inertia.wheel)
+    rates = principal_moments.nutation_rates(
         inertia.A, inertia.C, spacecraft.transverse_rate, spin, inertia.wheel
     )
     return SpinAxis(
         kind,
         grows.squared_exponent,
         grows.growth_time,
-        rigid_body.principal_tilt(inertia.axes),
+        principal_moments.principal_tilt(inertia.axes),
         rates,
     )

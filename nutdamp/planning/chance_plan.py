@@ -24,7 +24,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
-from nutdamp.montecarlo.statistics import cases_to_show
+from nutdamp.montecarlo.statistics import cases_to_show, stepped
 from nutdamp.montecarlo.study import (
     SEED,
     STRIDE,
@@ -44,7 +44,7 @@ from nutdamp.schemes.correction import model_of
 from nutdamp.schemes.optimal.chance import ChanceLimit, ChanceProgram, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS, Burn
 from nutdamp.schemes.optimal.problem import Problem, as_pulses, broken_by
-from nutdamp.schemes.optimal.refinement import EndEquations, Refinement, small_angles
+from nutdamp.schemes.optimal.refinement import EndEquations, refined, small_angles
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Part
@@ -208,8 +208,6 @@ def _scaled(value: Any, factor: float) -> Any:
     return None if value is None else tuple(_scaled(item, factor) for item in value)
 
 
-STEP = 1e-30  # imaginary step of derivatives
-
 MARGINS = tuple(1.21 * 0.9**step for step in range(12))
 """Margins that are tried, over the sigmas of the share required in a plane normal distribution.
 
@@ -246,7 +244,7 @@ plan is sought.
 
 def uncertain(spacecraft: Spacecraft, on_times: Vector, goal: Vector, stretch: Vector) -> Uncertain:
     """First-order effect of dispersions on pulses of ``on_times`` (K,) s, per second of them, by
-    complex steps.
+    central differences.
 
     The ``stretch`` (2,) of the torques of a `SymmetricModel` counts for the nutation, not for H.
     """
@@ -255,44 +253,39 @@ def uncertain(spacecraft: Spacecraft, on_times: Vector, goal: Vector, stretch: V
         for at, (channel, on) in enumerate(zip(spacecraft.channels, on_times, strict=True))
     ]
     model = DispersedModel(spacecraft, Schedule(tuple(pulses)))
+    draws, steps = stepped(model.inputs.drawn)
+    random = np.array([entry.kind != "bias" for entry in model.inputs.drawn], dtype=bool)
     drawn = [entry for entry in model.inputs.drawn if entry.kind != "bias"]
-    biases = (entry for entry in model.inputs.drawn if entry.kind == "bias")
-    draws = {entry.name: np.full(len(drawn) + 1, entry.size, dtype=complex) for entry in biases}
-    for at, entry in enumerate(drawn):
-        draws[entry.name] = np.zeros(len(drawn) + 1, dtype=complex)
-        draws[entry.name][at] = 1j * STEP * entry.sigma
+    sigmas = np.array([entry.sigma for entry in drawn])
     cases = model.cases(draws)
 
-    def parts(value: object) -> tuple[float, Vector]:
-        """Value and derivatives by one sigma."""
-        whole = np.broadcast_to(np.asarray(value, dtype=complex), len(drawn) + 1)
-        return float(whole[-1].real), np.asarray(whole[:-1].imag / STEP)
+    def parts(value: Any) -> tuple[Any, Any]:
+        """Values (...) and their derivatives (..., d) by one sigma, of those of cases, (..., n)."""
+        whole = np.broadcast_to(value, (*np.shape(value)[:-1], cases.count))
+        apart = 0.5 * (whole[..., : 2 * len(steps) : 2] - whole[..., 1::2]) / steps
+        return whole[..., :2].mean(axis=-1), apart[..., random] * sigmas
 
-    (A, dA), (C, dC), (wheel, dwheel) = parts(cases.A), parts(cases.C), parts(cases.wheel)
-    rates = [parts(component) for component in cases.untwisted(cases.omega0)]
-    spin, dspin = rates[2]
+    (first, second, C), (dfirst, dsecond, dC) = parts(cases.moments)
+    A, dA = 0.5 * (first + second), 0.5 * (dfirst + dsecond)
+    wheel, dwheel = parts(cases.wheel)
+    (x, y, spin), (dx, dy, dspin) = parts(cases.untwisted(cases.omega0))
     a = 1.0 - C / A
     da = C / A**2 * dA - dC / A
     axial, daxial = C * spin + wheel, dC * spin + C * dspin + dwheel
     dnutation = a * dspin + da * spin - dwheel / A + wheel / A**2 * dA
-    start = A * (rates[0][1] + 1j * rates[1][1]) + dA * complex(rates[0][0], rates[1][0])
-    tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
-    axis = cases.of_estimate((0.0, 0.0, 1.0))
-    lean = parts(axis[0])[1] + 1j * parts(axis[1])[1]
-    pointed = (
-        start + axial * (tilt[1] - 1j * tilt[0] + lean)
-        if spacecraft.goal.axis is not None
-        else np.zeros(len(drawn))
-    )
-    impulses = [[parts(part) for part in cases.untwisted(each)] for each in cases.impulses]
+    start = A * (dx + 1j * dy) + dA * complex(x, y)
+    pointed = np.zeros(len(drawn))
+    if spacecraft.goal.axis is not None:
+        _, (tilt, tilt_across) = parts(cases.tilt)
+        _, (lean, lean_across, _) = parts(cases.of_estimate(np.array([[0.0], [0.0], [1.0]])))
+        pointed = start + axial * (tilt_across - 1j * tilt + lean + 1j * lean_across)
     on = np.asarray(on_times)
-    nominal = np.array([[value for value, _ in impulse] for impulse in impulses])
-    changes = np.array([[change for _, change in impulse] for impulse in impulses])
-    begun = [parts(start) for start in cases.starts]
+    nominal, changes = parts(np.array([cases.untwisted(each) for each in cases.impulses]))
+    begun, late = parts(cases.starts)
     mixed = mixing(drawn, model.groups)
     effect = np.asarray((nominal[:, 0] + 1j * nominal[:, 1]) / on, dtype=np.complex128)
     torque = (changes[:, 0] + 1j * changes[:, 1]) / on[:, None] @ mixed
-    late, less = np.array([change for _, change in begun]) @ mixed, daxial / axial @ mixed
+    late, less = late @ mixed, daxial / axial @ mixed
     before = np.array([start, pointed]) @ mixed
     to_do = goal[:4:2] + 1j * goal[1:4:2]
     in_space = effect.real / stretch[0] + 1j * effect.imag / stretch[1]
@@ -305,9 +298,7 @@ def uncertain(spacecraft: Spacecraft, on_times: Vector, goal: Vector, stretch: V
         rates=np.array([*(np.array([dnutation, dspin]) @ mixed), np.zeros(len(drawn))]),
         start=np.array([*(before + less * to_do[:, None]), C * dspin @ mixed]),
         own=np.array([" pulse " in entry.name for entry in drawn], dtype=bool),
-        delay=np.array(
-            [value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)]
-        ),
+        delay=begun - np.array([pulse.start for pulse in pulses]),
         goal=np.array([*to_do, goal[4]]),
     )
 
@@ -449,7 +440,7 @@ class MarginPlanner:
         schedule = self.model.translate(as_pulses(self.model.symmetric, burns))
         left = solution.left[self.equations.chosen]
         fly = partial(propagation.flown, self.without_valves)
-        schedule = Refinement(fly(schedule), self.equations, left, fly).refined()
+        schedule = refined(fly(schedule), self.equations, left, fly)
         if not self.as_known.thrust_laws:
             return schedule
         try:

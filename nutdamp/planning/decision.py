@@ -10,11 +10,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from nutdamp.common import results, work
-from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note, note
 from nutdamp.errors import NutdampError
 from nutdamp.planning.plan import Plan, Standing, judge, plan, spinning, unflown
-from nutdamp.planning.verdict import Cases, Cheaper, Line, Verdict, no_plan
+from nutdamp.planning.verdict import Cases, Cheaper, Verdict, no_plan
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
@@ -26,20 +25,10 @@ from nutdamp.spacecraft.requirements import (
     missed,
     required,
 )
+from nutdamp.spacecraft.schedule import touching
 
 if TYPE_CHECKING:
     from nutdamp.planning.screening import FlownPlan
-
-# share of the recommended plan's momentum shift below which another plan keeps H much better
-STEADIER_SHIFT = 0.2
-FEWER_PULSES = 0.5  # share of its pulses up to which another plan is much simpler
-# share of its end up to which another one, a nutation period earlier at least, is much sooner
-SOONER_END = 0.5
-STEADIER_COST = 1.1  # largest cost ratio at which a smaller momentum shift is worth a note
-FEWER_COST = 1.05  # largest cost ratio at which fewer pulses are
-SOONER_COST = 1.05  # largest cost ratio at which an earlier end is
-# largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
-REAL_COST = 1.1
 
 SAME_ANGLE, SAME_SPEED = 1e-9, 1e-5
 """rad and m/s by which shifts of H and ΔV may differ and be equal: the rounding of a flight."""
@@ -67,23 +56,12 @@ TIES = (Ground.NOMINAL, Ground.PULSES, Ground.DELTA_V, Ground.SHIFT, Ground.END)
 """Grounds among plans of equal cost; the value of each is the code of its note."""
 
 
-class Gain(Enum):
-    """Advantage of another plan over the recommended one, by the code of its note."""
-
-    STEADIER = "smaller-shift"
-    SIMPLER = "fewer-pulses"
-    SOONER = "ends-sooner"
-    REAL = "real-widths"
-    COMMANDED = "as-blocks"
-
-
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """Recommended plan of the ``count`` of its ``standing``, by propellant or by impulse; None
     where none is feasible.
 
-    ``least``: what is saved, of `catalogue.LEAST`; ``alternatives``: the cheapest plan that gains
-    so much.
+    ``least``: what is saved, of `catalogue.LEAST`; ``rivals``: all plans that comply, with it.
     """
 
     plan: Plan | None = None
@@ -92,7 +70,7 @@ class Recommendation:
     count: int = 0
     by_propellant: bool = True
     least: str = catalogue.LEAST[0]
-    alternatives: Mapping[Gain, Plan] = field(default_factory=dict)
+    rivals: tuple[Plan, ...] = ()
 
 
 def recommend(
@@ -118,9 +96,8 @@ def recommend(
     those = [plan for plan in those if plan._kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those, least=least)
-        gains = _alternatives(best, those)
         return Recommendation(
-            best, standing, ground, len(those), by_propellant(those), least, gains
+            best, standing, ground, len(those), by_propellant(those), least, tuple(those)
         )
     most = max(_complying(cases[plan]) for plan in those) if cases else 0.0
     if cases and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
@@ -147,7 +124,7 @@ def cheapest(
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
-    unit = _unit(plans)
+    unit = cost_unit(plans)
     fewest = min(plan.pulses.spent(least, unit) for plan in plans)
     equal = [plan for plan in plans if plan.pulses.spent(least, unit) <= fewest * (1.0 + SAME_COST)]
     if len(equal) > 1 and least != catalogue.LEAST[0]:
@@ -160,7 +137,7 @@ def cheapest(
     for ground, measure, same in (
         (Ground.PULSES, lambda plan: float(len(plan.pulses)), 0.0),
         (Ground.DELTA_V, speed, SAME_SPEED),
-        (Ground.SHIFT, _off, SAME_ANGLE),
+        (Ground.SHIFT, off_target, SAME_ANGLE),
     ):
         values = [value for plan in equal if (value := measure(plan)) is not None]
         if len(values) < len(equal):  # not known of all
@@ -169,7 +146,9 @@ def cheapest(
         equal = [plan for plan, value in zip(equal, values, strict=True) if value <= fewest]
         if len(equal) == 1:
             return equal[0], ground
-    return min(equal, key=lambda plan: plan.pulses.end), Ground.END
+    earliest = min(plan.pulses.end for plan in equal)
+    first = next(plan for plan in equal if plan.pulses.end <= earliest + touching(earliest))
+    return first, Ground.END
 
 
 def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
@@ -191,48 +170,13 @@ def nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
     return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
 
 
-def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
-    """Cheapest of the ``plans`` with each gain on the ``best`` for little more; of command blocks
-    at any cost.
-    """
-    unit = _unit(plans)
-    spacecraft = best.spacecraft
-    turned = (
-        0.0
-        if spacecraft.goal.axis is not None or _off(best) <= DAMPED_ANGLE
-        else STEADIER_SHIFT * _off(best)
-    )
-    few = FEWER_PULSES * len(best.pulses)
-    soon = min(SOONER_END * best.pulses.end, best.pulses.end - spacecraft.inertial_period)
-    gains_of: dict[Gain, Plan] = {}
-    for gain, ratio, gains in (
-        (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < turned),
-        (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
-        (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= soon),
-        (Gain.REAL, REAL_COST, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
-        (
-            Gain.COMMANDED,
-            math.inf,
-            lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks,
-        ),
-    ):
-        most = ratio * best.pulses.cost_in(unit)
-        those = [
-            plan
-            for plan in plans
-            if len(plan.pulses) and gains(plan) and plan.pulses.cost_in(unit) <= most
-        ]
-        if those:
-            gains_of[gain] = min(those, key=lambda plan: plan.pulses.cost_in(unit))
-    return gains_of
-
-
 def by_propellant(plans: Sequence[Plan]) -> bool:
     """True if propellant is known for all plans, which are compared by it; else by impulse."""
     return all(plan.pulses.propellant is not None for plan in plans)
 
 
-def _unit(plans: Sequence[Plan]) -> str:
+def cost_unit(plans: Sequence[Plan]) -> str:
+    """Unit of the costs that plans are compared by."""
     return "kg" if by_propellant(plans) else "N m s"
 
 
@@ -241,7 +185,8 @@ def speed(plan: Plan) -> float | None:
     return None if plan._delta_v is None else math.hypot(*plan._delta_v.tolist())
 
 
-def _off(plan: Plan) -> float:
+def off_target(plan: Plan) -> float:
+    """Distance of H at the end from the target axis, or its start, rad."""
     assert plan.flown is not None
     return plan.flown.axis_error
 
@@ -377,23 +322,15 @@ class Comparison(results.Data, results.Tabled):
         plan = self.recommended
         if plan is None:
             return no_plan(self.spacecraft)
-        return replace(self.verdicts[plan], cheaper=tuple(self._cheaper(plan)))
-
-    def _cheaper(self, chosen: Plan) -> Iterator[Cheaper]:
-        """Compared plans that take less of what is saved, with the reason why they are not
-        recommended.
-        """
-        feasible = [plan for plan in self.plans if plan.feasible]
-        unit = _unit(feasible)
-        most = chosen.pulses.spent(self.least, unit) * (1.0 - SAME_COST)
+        feasible = [each for each in self.plans if each.feasible]
+        unit = cost_unit(feasible)
+        most = plan.pulses.spent(self.least, unit) * (1.0 - SAME_COST)
+        cheaper = []
         for other in feasible:
-            why = self.shortcoming(other)
-            if (
-                other is not chosen
-                and other.pulses.spent(self.least, unit) < most
-                and why is not None
-            ):
-                yield Cheaper(other.scheme, other.pulses, why)
+            if other is not plan and other.pulses.spent(self.least, unit) < most:
+                why = self.shortcoming(other)
+                cheaper += [] if why is None else [Cheaper(other.scheme, other.pulses, why)]
+        return replace(self.verdicts[plan], cheaper=tuple(cheaper))
 
     def shortcoming(self, plan: Plan) -> Note | None:
         """Reason for which a feasible plan may not be recommended, whatever it costs; None where
@@ -402,7 +339,7 @@ class Comparison(results.Data, results.Tabled):
         verdict = self.verdicts[plan]
         missed = next((line for line in verdict.lines if not line.bound.met(line.nominal)), None)
         if missed is not None:
-            return note_on(missed)
+            return missed.note
         if not plan._commandable and self.only_commanded:
             return note("why-single-pulses")
         cases = verdict.cases
@@ -427,34 +364,6 @@ class Comparison(results.Data, results.Tabled):
         """True where of no plan of the usual schemes dispersed cases show that enough comply."""
         flown = any(cases.samples for cases in self.cases.values())
         return flown and not self.named and self.verdict.met is False
-
-    @cached_property
-    def with_disturbances(self) -> Plan | None:
-        """Recommendation among the schemes planned with the disturbances; None where they were, or
-        there are none.
-
-        A scheme that is slow is planned only where no other one complies.
-        """
-        chosen, spacecraft = self.recommended, self.spacecraft
-        if chosen is None or not spacecraft.disturbances or chosen.options.with_disturbances:
-            return None
-        others: tuple[Plan, ...] = ()
-        try:
-            for slow in (False, True):
-                for plan in self.plans:
-                    scheme = catalogue.SCHEMES.get(plan.scheme)
-                    if scheme is None or scheme.slow != slow:
-                        continue
-                    if not scheme.on_true_body:  # which is planned with them in any case
-                        aware = replace(plan.options, with_disturbances=True)
-                        plan = attempt(spacecraft, plan.scheme, aware)
-                    others = (*others, plan)
-                best = replace(self, plans=others, flown=None, preferred=None).recommended
-                if best is not None and best._standing is Standing.COMPLIES:
-                    break
-        except NutdampError:
-            return None
-        return best
 
     @property
     def failed(self) -> tuple[Plan, ...]:
@@ -575,25 +484,3 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
     except Exception as failure:
         return Plan(spacecraft, scheme, None, f"{BUG}: {type(failure).__name__}", _failure=failure)
     return planned
-
-
-WHY = {
-    Part.NUTATION: "why-nutation",
-    Part.SHIFT: "why-momentum-shift",
-    Part.DISTANCE: "why-axis-error",
-    Part.SPIN: "why-spin",
-    Part.DURING: "why-nutation-during",
-    Part.CONE: "why-cone",
-}
-"""Codes of the notes on a bound that a plan breaks."""
-
-
-def note_on(line: Line) -> Note:
-    """Note on a bound that the nominal value of a plan breaks."""
-    bound = line.bound
-    code = WHY[line.bound.part]
-    if bound.part is Part.SPIN:
-        return note(code, off_rpm=RPM * line.nominal)
-    if bound.part is Part.CONE and bound.keep is not None:
-        return note(code, angle_deg=math.degrees(line.nominal), direction=bound.keep.name)
-    return note(code, angle_deg=math.degrees(line.nominal))

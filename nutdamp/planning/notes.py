@@ -5,16 +5,27 @@ values.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
+from nutdamp.errors import NutdampError
 from nutdamp.flight.propagation import Flight
-from nutdamp.physics import body as rigid_body
-from nutdamp.planning.decision import ROBUST, TIES, Comparison, Gain, Ground
+from nutdamp.physics import inertia as principal_moments
+from nutdamp.planning.decision import (
+    ROBUST,
+    TIES,
+    Comparison,
+    Ground,
+    attempt,
+    cost_unit,
+    off_target,
+)
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes import catalogue
@@ -23,7 +34,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import WASTEFUL, worths
 from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import DAMPED_ANGLE, Part
 
 if TYPE_CHECKING:
     from nutdamp.flight.cones import Aspect
@@ -44,7 +55,7 @@ ALIKE = math.pi * catalogue.DEFAULT_SHARE
 
 def spacecraft_notes(spacecraft: Spacecraft) -> Iterator[Note]:
     """Notes on a spacecraft that hold before any plan and for each."""
-    tilt = rigid_body.principal_tilt(spacecraft.inertia.axes)
+    tilt = principal_moments.principal_tilt(spacecraft.inertia.axes)
     damped = next(one for one in requirements.bounds(spacecraft) if one.part is Part.NUTATION)
     if not damped.met(tilt):
         limit = math.degrees(damped.limit)
@@ -381,7 +392,7 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
     spacecraft = chosen.spacecraft
     parts = {bound.part for bound in chosen._shortfalls}
     if spacecraft.disturbances and not chosen.options.with_disturbances:
-        aware = compared.with_disturbances
+        aware = with_disturbances(compared)
         if aware is None:
             yield note("unplanned-disturbances")
         elif aware._standing is Standing.COMPLIES:
@@ -401,17 +412,104 @@ def _missed(chosen: Plan, compared: Comparison, *, tabulated: bool) -> Iterator[
             yield note("try-trade")  # no end and no axis of H keeps a cone that is broken at t = 0
 
 
+def with_disturbances(compared: Comparison) -> Plan | None:
+    """Recommendation among the schemes planned with the disturbances; None where they were, or
+    there are none.
+
+    A scheme that is slow is planned only where no other one complies.
+    """
+    chosen, spacecraft = compared.recommended, compared.spacecraft
+    if chosen is None or not spacecraft.disturbances or chosen.options.with_disturbances:
+        return None
+    others: tuple[Plan, ...] = ()
+    try:
+        for slow in (False, True):
+            for plan in compared.plans:
+                scheme = catalogue.SCHEMES.get(plan.scheme)
+                if scheme is None or scheme.slow != slow:
+                    continue
+                if not scheme.on_true_body:  # which is planned with them in any case
+                    aware = replace(plan.options, with_disturbances=True)
+                    plan = attempt(spacecraft, plan.scheme, aware)
+                others = (*others, plan)
+            best = replace(compared, plans=others, flown=None, preferred=None).recommended
+            if best is not None and best._standing is Standing.COMPLIES:
+                break
+    except NutdampError:
+        return None
+    return best
+
+
+# share of the recommended plan's momentum shift below which another plan keeps H much better
+STEADIER_SHIFT = 0.2
+FEWER_PULSES = 0.5  # share of its pulses up to which another plan is much simpler
+# share of its end up to which another one, a nutation period earlier at least, is much sooner
+SOONER_END = 0.5
+STEADIER_COST = 1.1  # largest cost ratio at which a smaller momentum shift is worth a note
+FEWER_COST = 1.05  # largest cost ratio at which fewer pulses are
+SOONER_COST = 1.05  # largest cost ratio at which an earlier end is
+# largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
+REAL_COST = 1.1
+
+
+class Gain(Enum):
+    """Advantage of another plan over the recommended one, by the code of its note."""
+
+    STEADIER = "smaller-shift"
+    SIMPLER = "fewer-pulses"
+    SOONER = "ends-sooner"
+    REAL = "real-widths"
+    COMMANDED = "as-blocks"
+
+
+def gains(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
+    """Cheapest of the ``plans`` with each gain on the ``best`` for little more; of command blocks
+    at any cost.
+    """
+    unit = cost_unit(plans)
+    spacecraft = best.spacecraft
+    turned = (
+        0.0
+        if spacecraft.goal.axis is not None or off_target(best) <= DAMPED_ANGLE
+        else STEADIER_SHIFT * off_target(best)
+    )
+    few = FEWER_PULSES * len(best.pulses)
+    soon = min(SOONER_END * best.pulses.end, best.pulses.end - spacecraft.inertial_period)
+    gains_of: dict[Gain, Plan] = {}
+    for gain, ratio, has in (
+        (Gain.STEADIER, STEADIER_COST, lambda plan: off_target(plan) < turned),
+        (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
+        (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= soon),
+        (Gain.REAL, REAL_COST, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
+        (
+            Gain.COMMANDED,
+            math.inf,
+            lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks,
+        ),
+    ):
+        most = ratio * best.pulses.cost_in(unit)
+        those = [
+            plan
+            for plan in plans
+            if len(plan.pulses) and has(plan) and plan.pulses.cost_in(unit) <= most
+        ]
+        if those:
+            gains_of[gain] = min(those, key=lambda plan: plan.pulses.cost_in(unit))
+    return gains_of
+
+
 def alternatives(compared: Comparison) -> Iterator[Note]:
     """Plans that the reader may prefer: much better in some way for little more, each once, with
     its figures.
     """
     recommendation = compared.recommendation
-    chosen = recommendation.plan
+    chosen, rivals = recommendation.plan, recommendation.rivals
+    if chosen is None or not rivals:
+        return
     others = dict[int, tuple[Gain, Plan]]()
-    for gain, plan in recommendation.alternatives.items():
+    for gain, plan in gains(chosen, rivals).items():
         others.setdefault(id(plan), (gain, plan))
     for gain, other in others.values():
-        assert chosen is not None
         yield note(
             gain.value, scheme=other.scheme, **figures(other, chosen, recommendation.by_propellant)
         )

@@ -6,6 +6,7 @@ dispersed cases become a `Status`, and nothing else makes one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -16,10 +17,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.results import Note
+from nutdamp.common.numerics import RPM
+from nutdamp.common.results import Note, note
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, required_share
-from nutdamp.spacecraft.requirements import Bound, Held
+from nutdamp.spacecraft.requirements import Bound, Held, Part
 from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
@@ -149,6 +151,17 @@ def cases_of(results: JudgedCases, *, final: bool = True) -> Cases:
     )
 
 
+WHY = {
+    Part.NUTATION: "why-nutation",
+    Part.SHIFT: "why-momentum-shift",
+    Part.DISTANCE: "why-axis-error",
+    Part.SPIN: "why-spin",
+    Part.DURING: "why-nutation-during",
+    Part.CONE: "why-cone",
+}
+"""Codes of the notes on a bound that the nominal value of a plan breaks."""
+
+
 class Line(NamedTuple):
     """A bound beside its value with ``nominal`` values and what the share of cases required keeps,
     rad or rad/s.
@@ -178,6 +191,17 @@ class Line(NamedTuple):
         """Share of the cases that keep the bound, then its free fraction: the least is tightest."""
         free = 1.0 - float(self.bound.used(self.value))
         return 1.0 if self.share is None else self.share, free
+
+    @property
+    def note(self) -> Note:
+        """Note on a bound that the nominal value breaks."""
+        code = WHY[self.bound.part]
+        if self.bound.part is Part.SPIN:
+            return note(code, off_rpm=RPM * self.nominal)
+        angle = math.degrees(self.nominal)
+        if self.bound.part is Part.CONE and self.bound.keep is not None:
+            return note(code, angle_deg=angle, direction=self.bound.keep.name)
+        return note(code, angle_deg=angle)
 
 
 class Cause(NamedTuple):

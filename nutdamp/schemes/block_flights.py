@@ -1,14 +1,13 @@
 """Sequences of command blocks as a table, and their flights in batches.
 
-Flights of a batch go on together from Sun pulse to Sun pulse, each of its own motion. What they
-leave is exact where a free motion keeps it; the best is flown once more by its pulses alone.
+Each flies from the Sun pulses of its own nutating motion; what flights leave is exact where a free
+motion keeps it, and the best is flown once more by its pulses alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,43 +28,27 @@ Array = NDArray[Any]
 Index = NDArray[Any]  # whole numbers
 Blocks = tuple[Block, ...]
 
-COLUMNS = ("parent", "kind", "first", "delay", "width", "count", "share")
 
+class BlockSequences(NamedTuple):
+    """Sequences of blocks, one a row.
 
-@dataclass(frozen=True, eq=False)
-class BlockSequences:
-    """Sequences of blocks, one a row: the last block behind a row of those ``before``.
-
-    ``kind``: channel and interval; ``share`` of a bound that is used up, and the ``state`` of the
-    motion behind.
+    ``blocks`` (n, b, 5): kind (channel and interval), first Sun pulse, delay, width and number of
+    pulses of each block; ``share`` of a bound that is used up, and the ``state`` of the motion
+    behind.
     """
 
-    before: BlockSequences | None
-    parent: Index
-    kind: Index
-    first: Index
-    delay: Array
-    width: Array
-    count: Index
+    blocks: Array
     share: Array
     state: BlockState
+
+    def some(self, rows: Index) -> BlockSequences:
+        """Subset of rows."""
+        return BlockSequences(self.blocks[rows], self.share[rows], self.state.some(rows))
 
     @property
     def cost(self) -> Array:
         """Propellant, kg."""
         return np.asarray(self.state.cost)
-
-    def some(self, rows: Index) -> BlockSequences:
-        """Subset of rows."""
-        columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in COLUMNS}
-        return replace(self, **columns, state=self.state.some(rows))
-
-    def pulses(self, rows: Index) -> Index:
-        """Number of pulses of rows."""
-        count = self.count[rows]
-        if self.before is None:
-            return count
-        return np.asarray(count + self.before.pulses(self.parent[rows]))
 
     @property
     def ranked(self) -> Index:
@@ -75,14 +58,13 @@ class BlockSequences:
 
 
 class FlownSequence(NamedTuple):
-    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in
-    s. ``reckoned``: its cost in closed form.
+    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost in
+    steps of `SAME_COST`, number of pulses, end in s.
     """
 
-    rank: tuple[bool, float, float, float]
+    rank: tuple[bool, float, int, int, float]
     schedule: Schedule
     end: Array  # (11,) as in `SunPulses.ends`
-    reckoned: float = 0.0
     confirmed: bool = False
 
     @property
@@ -94,7 +76,7 @@ class FlownSequence(NamedTuple):
 class BlockFlights:
     """Flights of sequences of one spacecraft, and the ``bounds`` that they are judged by.
 
-    ``cheapest``: the least cost in closed form of one that complied.
+    ``cheapest``: the least cost of one that complied.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
@@ -124,34 +106,22 @@ class BlockFlights:
             for bound in self.bounds
         }
 
-    def fly(self, sequences: Sequence[Blocks], costs: Sequence[float]) -> None:
+    def fly(self, sequences: Iterable[Blocks]) -> None:
         """Fly sequences together, those that have not been flown."""
-        new = {
-            blocks: cost
-            for blocks, cost in zip(sequences, costs, strict=True)
-            if blocks not in self.of
-        }
+        new = [blocks for blocks in dict.fromkeys(sequences) if blocks not in self.of]
         if not new:
             return
-        try:
-            schedules, sun_pulses = fire_all(self.spacecraft, list(new))
-        except Infeasible as reason:  # the motion of one of them cannot be followed
-            self.why = reason
-            if len(new) > 1:
-                for blocks, cost in new.items():
-                    self.fly([blocks], [cost])
-            return
+        schedules, sun_pulses = fire_all(self.spacecraft, new)
         ends = sun_pulses.ends
         shares = self.share(sun_pulses.residual(self.spacecraft))
-        for index, (blocks, cost) in enumerate(new.items()):
-            schedule = schedules[index]
+        for index, (blocks, schedule) in enumerate(zip(new, schedules, strict=True)):
             if isinstance(schedule, Infeasible):
                 self.why = schedule
                 continue
             rank = _rank(schedule, float(shares[index]))
-            self.of[blocks] = FlownSequence(rank, schedule, ends[:, index], cost)
+            self.of[blocks] = FlownSequence(rank, schedule, ends[:, index])
         if self.of and self.best().complies:
-            self.cheapest = min(self.cheapest, self.best().reckoned)
+            self.cheapest = min(self.cheapest, self.best().schedule.cost)
 
     def best(self) -> FlownSequence:
         """The best flight, confirmed by the limits and by the flight of its pulses alone."""
@@ -159,53 +129,20 @@ class BlockFlights:
             blocks, best = min(self.of.items(), key=lambda each: each[1].rank)
             if best.confirmed:
                 return best
-            self.of[blocks] = self._confirmed(best)
-
-    def _confirmed(self, flight: FlownSequence) -> FlownSequence:
-        """The flight with its true rank."""
-        schedule = flight.schedule
-        breaks = not keeps_limits(self.spacecraft, schedule)
-        share = float(self.share(left_by(propagation.flown(self.spacecraft, schedule))))
-        rank = _rank(schedule, share, breaks=breaks)
-        return flight._replace(rank=rank, confirmed=True)
-
-    def chosen(self) -> FlownSequence:
-        """Of those that cost as much as the best the one of the fewest pulses, then of the earlier
-        end.
-        """
-        best = self.best()
-        broken, missed, cost, _ = best.rank
-        alike = [
-            flight
-            for flight in self.of.values()
-            if flight.rank[:2] <= (broken, missed) and flight.rank[2] <= cost * (1.0 + SAME_COST)
-        ]
-        alike.sort(key=lambda each: (len(each.schedule), each.schedule.end, each.rank))
-        for flight in alike:
-            confirmed = flight if flight.confirmed else self._confirmed(flight)
-            if confirmed.rank[:2] <= (broken, missed):
-                return confirmed
-        return best
+            schedule = best.schedule
+            breaks = not keeps_limits(self.spacecraft, schedule)
+            share = float(self.share(left_by(propagation.flown(self.spacecraft, schedule))))
+            rank = _rank(schedule, share, breaks=breaks)
+            self.of[blocks] = best._replace(rank=rank, confirmed=True)
 
 
 def _rank(
     schedule: Schedule, share: float, *, breaks: bool = False
-) -> tuple[bool, float, float, float]:
+) -> tuple[bool, float, int, int, float]:
     """Rank of a flight; rounding is no reason to wait for a Sun pulse."""
     missed = 0.0 if complies(share) else float(f"{share:.9g}")
-    return breaks, missed, schedule.cost, schedule.end
-
-
-def joined(before: BlockSequences, parts: Sequence[BlockSequences]) -> BlockSequences:
-    """Sequences of several tables in one."""
-    if not parts:
-        return before.some(np.zeros(0, dtype=np.intp))
-    columns: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS
-    }
-    state = BlockState.joined([part.state for part in parts])
-    _, rows = np.unique(np.array(list(columns.values())), axis=1, return_index=True)
-    return BlockSequences(before, **columns, state=state).some(rows)
+    steps = round(math.log(max(schedule.cost, 1e-300)) / SAME_COST)
+    return breaks, missed, steps, len(schedule), schedule.end
 
 
 def least(keys: Array, most: int) -> Index:
@@ -216,16 +153,10 @@ def least(keys: Array, most: int) -> Index:
     return np.asarray(np.argpartition(keys, most - 1, axis=1)[:, :most])
 
 
-def front(costs: Array, share: float) -> Index:
-    """Of costs in order those less than a ``share`` of all before them."""
-    rows = list[int]()
-    cheapest = math.inf
-    while True:
-        lower = np.flatnonzero(costs < share * cheapest)
-        if not len(lower):
-            return np.array(rows, dtype=np.intp)
-        rows.append(int(lower[0]))
-        cheapest = float(costs[lower[0]])
+def first_of_each(order: Index, *keys: Array) -> Index:
+    """Of rows in order the first of each value of the ``keys``, in order."""
+    _, index = np.unique(np.array([key[order] for key in keys]), axis=1, return_index=True)
+    return np.asarray(order[np.sort(index)])
 
 
 def grid_size(turns: int, kinds: Sequence[tuple[int, int]], allowed: int, most: int) -> float:

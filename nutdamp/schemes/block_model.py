@@ -25,10 +25,9 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply, make_dynamics, shed
 from nutdamp.flight.propagation import Flight, to_sun_pulse
 from nutdamp.physics import attitude, precession
-from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies
+from nutdamp.physics.motion import Bodies, MotionStretch
 from nutdamp.physics.sky import SunPulseClock, TorqueRamp, ahead
-from nutdamp.physics.thruster import Valve, spread
+from nutdamp.physics.thruster import Valve, action
 from nutdamp.spacecraft.equipment import Block, Channel, firings
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
@@ -43,20 +42,11 @@ BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waite
 ALWAYS = 500  # Sun pulses that flights of blocks may take whatever work is spent
 NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
-# Units of `work` of a step of Newton's method to a Sun pulse under thrust: the plan of a steerable
-# stage that is pushed for a turn and more took 5 s of which nothing was charged.
-LOOKED_BACK = 2.0
-
-# Steps of Newton's method to a Sun pulse of flights that are integrated, beyond which each takes
-# `work`, and units of it: where dissipation lets the nutation grow past 60 deg a search took 14 s
-# of which 9 s were charged.
-USUAL, MOVED = 8, 0.7
-
 # Units of `work` of a pulse that is fired, of the motion of all flights to the next Sun pulse, and
 # of a turn of theirs that is integrated (64 flights of 20 pulses take 50 ms, of ACE 190 ms).
 FIRED, STEPPED, INTEGRATED = 0.05, 0.7, 6.0
 
-KEPT = 4_000_000  # entries of tables of the supply that are kept
+KEPT = 100  # tables of the supply that are kept
 
 
 def spin_turn(spacecraft: Spacecraft) -> float:
@@ -255,17 +245,11 @@ def fire_all(
     arcs = spacecraft.inertia.symmetric and not spacecraft.disturbances
     per_kg = shed(spacecraft)
     over, passed = np.zeros(count), np.zeros(count)
-    looked_back = moves = 0
     turn = spin_turn(spacecraft)
     for motion, flights in sun_pulses:
         turns = 1.0 if arcs else float(np.max(motion.since - passed)) / turn
         passed = motion.since
-        back = LOOKED_BACK * (clock.looked_back - looked_back)
-        looked_back = clock.looked_back
-        more = 0.0 if arcs else MOVED * max(clock.moves - moves - USUAL, 0)
-        moves = clock.moves
-        stepped = STEPPED if arcs else INTEGRATED * turns + more
-        work.spend(stepped + FIRED * len(flights) + back)
+        work.spend((STEPPED if arcs else INTEGRATED * turns) + FIRED * len(flights))
         delays, angles, widths = np.zeros((3, count))
         given = dict[int, Pulse]()
         due = {flight: next(following[flight]) for flight in flights}
@@ -371,9 +355,7 @@ def acts(channel: Channel, widths: Any) -> Acts:
 @functools.lru_cache(maxsize=4096)
 def _acts(valve: Valve, width: float) -> Acts:
     on_time, centroid, ramps = valve.thrust(width)
-    return Acts(
-        on_time, centroid, spread(ramps, centroid), max([width, *(ramp.end for ramp in ramps)])
-    )
+    return Acts(on_time, centroid, action(ramps)[2], max([width, *(ramp.end for ramp in ramps)]))
 
 
 def evenly(values: Any, most: int) -> Any:
@@ -505,8 +487,7 @@ class BlockModel:
         most = int(np.max(count))
         key = (channel.name, fired, used, most, on_times.tobytes())
         if key not in self._tables:
-            if sum(full.size for full, _ in self._tables.values()) > KEPT:
-                self._tables.clear()
+            self._tables = {**dict([*self._tables.items()][-KEPT:])}
             self._tables[key] = Supply(self.spacecraft, Counter({channel.name: fired}), used).train(
                 channel, on_times, most
             )

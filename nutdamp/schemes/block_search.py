@@ -3,9 +3,10 @@
 Block after block, each sequence of the beam is continued by blocks of every channel and interval:
 pairs of width and number of pulses by their merits, after some waits, at the delays next to the two
 that serve best: one for the heading of H, one for the nutation. `BlockModel` gives the motion of
-all of them at once. The most promising are flown together from the Sun pulses of the nutating body.
-Grids of up to `WHOLE` sequences are searched whole: of these no pair, wait or delay is left out but
-what surely misses, or costs more than a flight that complies.
+all of them at once. The most promising are flown together, each from the Sun pulses of its own
+nutating motion; what they leave is exact where a free motion keeps it, and the best is flown once
+more by its pulses alone. Grids of up to `WHOLE` sequences are searched whole: of these no pair,
+wait or delay is left out but what surely misses, or costs more than a flight that complies.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,9 +26,8 @@ from nutdamp.schemes.block_flights import (
     Blocks,
     BlockSequences,
     Index,
-    front,
+    first_of_each,
     grid_size,
-    joined,
     least,
 )
 from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly
@@ -60,6 +59,7 @@ COARSE = 300  # cheapest sequences that are continued where delays are few: as i
 DOUBTFUL = 1.5  # share of a bound up to which the closed form may err
 FLOWN = 64  # sequences that are flown together, by each merit
 FIRST = 12  # sequences that are flown first
+LEVEL = 0.1  # relative step of the cost, of each of which the nearest sequence is continued
 BATCHES = 16  # multiple of `FLOWN` of doubtful sequences that are flown, the cheapest first
 FLOWN_PULSES = 4000  # pulses of a batch of flights, at most: it then takes less than a second
 # multiple of the least cost above which further blocks are looked for though one complies
@@ -82,7 +82,7 @@ class BlockSearch:
         self.model = BlockModel(spacecraft)
         self.flights = BlockFlights(spacecraft)
         self.limit = {bound.part: bound.limit for bound in self.flights.bounds}
-        self.rows = dict[Blocks, tuple[BlockSequences, int]]()  # of those that are flown
+        self.rows = dict[Blocks, BlockState]()  # closed form of those that are flown
         limits, turn, step = spacecraft.limits, self.model.turn, commands.delay_step
         self.allowed = min(commands.max_count, LONGEST, limits.max_pulses or LONGEST)
         self.pause = math.ceil(limits.gap / turn)
@@ -107,11 +107,7 @@ class BlockSearch:
     @property
     def start(self) -> BlockSequences:
         """The sequence of no blocks."""
-        row = np.zeros(1, dtype=np.intp)
-        state = self.model.start.some(row)
-        return BlockSequences(
-            None, row, row, row + 1, row + 0.0, row + 0.0, row, row + math.inf, state
-        )
+        return BlockSequences(np.zeros((1, 0, 5)), np.array([math.inf]), self.model.start.some([0]))
 
     def run(self) -> None:
         """Search, and fly what is promising; ``flights`` has the results."""
@@ -154,18 +150,26 @@ class BlockSearch:
 
     def continued(self, before: BlockSequences, *, last: bool) -> BlockSequences:
         """Sequences of one block more."""
-        first = before.before is None
+        first = not before.blocks.shape[1]
         earliest = self.earliest if first else self.pause
-        parts = list[BlockSequences]()
-        for rows in self._groups(before.state):
-            if work.exhausted() and parts:
+        # Together go those that have used as much of the supply, or all; where there are blackouts
+        # each has waits of its own.
+        keys: Array = np.zeros((1, len(before.share)))
+        if len(self.dark[0]) > 0 and not self.whole:
+            keys = np.arange(len(before.share))[None]
+        elif not self.model.steady:
+            keys = np.array([before.state.used, *before.state.fired.values()])
+        distinct, key = np.unique(keys, axis=1, return_inverse=True)
+        none = np.zeros((0, before.blocks.shape[1] + 1, 5))
+        parts = [before.some(np.zeros(0, dtype=int))._replace(blocks=none)]
+        for number in range(distinct.shape[1]):
+            if work.exhausted() and len(parts) > 1:
                 break
-            group = before.some(rows)
+            group = before.some(np.flatnonzero(key.ravel() == number))
             for kind in range(len(self.kinds)):
                 pairs = self.pairs(group, kind, first=first, last=last)
                 waits = self.waits(group.state, earliest)
-                pairs = rows[pairs[0]], *pairs[1:]
-                parts += self.behind(before, kind, pairs, waits, last=last)
+                parts += self.behind(group, kind, pairs, waits, last=last)
                 if self.flights.damps and not (last or self.whole):
                     cheap = np.flatnonzero(pairs[2] <= 2)
                     cheap = cheap[np.argsort(pairs[1][cheap] * pairs[2][cheap], kind="stable")]
@@ -174,22 +178,12 @@ class BlockSearch:
                     steps = np.linspace(0.0, self.last_delay, PHASES) * self.commands.delay_step
                     delays = self.commanded(steps)
                     early = waits[: WAITS // 3]
-                    parts += self.behind(before, kind, some, early, last=last, delays=delays)
-        return joined(before, parts)
-
-    def _groups(self, state: BlockState) -> list[Index]:
-        """Rows that are continued together: after as much propellant, and waits of their own
-        where there are blackouts.
-        """
-        rows = np.arange(len(state.sun_pulse))
-        if len(self.dark[0]) > 0 and not self.whole:
-            return list(rows[:, None])
-        if self.model.steady or not len(rows):
-            return [rows]
-        supplies = np.array([state.used, *state.fired.values()])
-        _, group = np.unique(supplies, axis=1, return_inverse=True)
-        group = group.ravel()
-        return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+                    parts += self.behind(group, kind, some, early, last=last, delays=delays)
+        blocks = np.concatenate([part.blocks for part in parts])
+        share = np.concatenate([part.share for part in parts])
+        joined = BlockSequences(blocks, share, BlockState.joined([part.state for part in parts]))
+        _, distinct = np.unique(blocks, axis=0, return_index=True)
+        return joined.some(distinct)
 
     def pairs(
         self, before: BlockSequences, kind: int, *, first: bool, last: bool
@@ -238,56 +232,50 @@ class BlockSearch:
     def beam(self, sequences: BlockSequences) -> BlockSequences:
         """The promising sequences, with the motion of their flights."""
         rows = self._fly(sequences, self.promising(sequences))
-        flights = [self.flights.of.get(self.blocks(sequences, int(row))) for row in rows]
-        rows = rows[[flight is not None for flight in flights]]
-        beam = sequences.some(rows)
-        if not len(rows):
+        flights = [self.flights.of.get(blocks) for blocks in self.blocks(sequences, rows)]
+        beam = sequences.some(rows[[flight is not None for flight in flights]])
+        if not len(beam.share):
             return beam
         ends = np.array([flight.end for flight in flights if flight is not None]).T
-        return replace(beam, state=beam.state.shifted(self.model.apart(beam.state, ends)))
+        return beam._replace(state=beam.state.shifted(self.model.apart(beam.state, ends)))
 
     def promising(self, sequences: BlockSequences) -> Index:
-        """Rows that are continued: the best of each width, number and interval, those that leave
-        least for their cost, and the gentle.
-        """
-        order = sequences.ranked
-        order = order[sequences.cost[order] < self.flights.cheapest]
-        kinds = np.array([sequences.width, sequences.count, sequences.kind % self.intervals])
-        _, index = np.unique(kinds[:, order].T, axis=0, return_index=True)
-        distinct = order[np.sort(index)]
-        gentle = distinct[sequences.count[distinct] <= GENTLE]
-        costs = sequences.cost[distinct]
-        fronts = [distinct[front(costs, share)[:BEAM]] for share in (0.9, 1.0)]
-        rows = (distinct[:BEAM], *fronts, gentle[:BEAM])
-        spread = self._spread(sequences, order if self.flights.damps else distinct)
-        cheap = order[np.argsort(sequences.cost[order], kind="stable")]
-        cheap = cheap[: COARSE if self.coarse else 0]
-        return np.unique(np.concatenate([*rows, spread, cheap]))
-
-    def _spread(self, sequences: BlockSequences, order: Index) -> Index:
-        """Of rows in order the best that have gone each of equal parts of the way to the target, or
+        """Rows that are continued: the best of each width, number and interval, of each cost, and
+        the gentle; with a target those that have gone each of equal parts of the way to it, else
         those of which one gentle block more may be the cheapest that do.
         """
-        state = sequences.state.some(order)
-        if not self.flights.damps:
-            if self.spacecraft.goal.axis is None or not len(order):
-                return order[:0]
-            way = self.model.course(state)[1]
-            part = np.floor(BEAM * way / max(float(np.max(way, initial=0.0)), 1e-300))
-            _, index = np.unique(part, return_index=True)
-            return np.asarray(order[index])
-        totals = np.full(len(order), np.inf)
-        for kind, (channel, every) in enumerate(self.kinds):
-            width = np.repeat(self.widths[kind], GENTLE)
-            count = np.tile(np.arange(1, GENTLE + 1), len(self.widths[kind]))
-            misses = self.damping_misses(state, channel, every, width, count)
-            spent = acts(channel, width).on_time * count * channel.cost_rate(by_propellant=True)
-            total = np.where(complies(misses), state.cost[:, None] + spent, np.inf)
-            totals = np.minimum(totals, total.min(axis=1, initial=np.inf))
-        both = np.array([np.round(totals, 12), sequences.kind[order]])
-        _, index = np.unique(both, axis=1, return_index=True)
-        index = index[np.isfinite(totals[index])][: 2 * BEAM]
-        return np.asarray(order[index])
+        order = sequences.ranked
+        cost = sequences.cost
+        order = order[cost[order] < self.flights.cheapest]
+        kind, _, _, width, count = sequences.blocks[:, -1].T
+        distinct = first_of_each(order, width, count, kind % self.intervals)
+        nearest = order[np.argsort(sequences.share[order], kind="stable")]
+        level = np.floor(np.log(np.maximum(cost, 1e-300)) / LEVEL)
+        rows = [
+            distinct[:BEAM],
+            distinct[count[distinct] <= GENTLE][:BEAM],
+            first_of_each(nearest, level)[:BEAM],
+        ]
+        if self.coarse:
+            rows.append(order[np.argsort(cost[order], kind="stable")][:COARSE])
+        if self.spacecraft.goal.axis is not None and len(order):
+            way = self.model.course(sequences.state)[1]
+            rows.append(
+                first_of_each(distinct, np.floor(BEAM * way / max(way[order].max(), 1e-300)))
+            )
+        if self.flights.damps:
+            totals = np.full(len(cost), np.inf)
+            for number, (channel, every) in enumerate(self.kinds):
+                widths = np.repeat(self.widths[number], GENTLE)
+                counts = np.tile(np.arange(1, GENTLE + 1), len(self.widths[number]))
+                misses = self.damping_misses(sequences.state, channel, every, widths, counts)
+                price = acts(channel, widths).on_time * channel.cost_rate(by_propellant=True)
+                total = np.where(complies(misses), cost[:, None] + price * counts, np.inf)
+                totals = np.minimum(totals, total.min(axis=1, initial=np.inf))
+            able = order[np.isfinite(totals[order])]
+            cheapest = first_of_each(able, np.round(totals, 12), kind)
+            rows.append(cheapest[np.argsort(totals[cheapest], kind="stable")][: 2 * BEAM])
+        return np.unique(np.concatenate(rows))
 
     # --- the kernel
 
@@ -336,8 +324,8 @@ class BlockSearch:
                 rest = least(table, 2 if last or delays is None else table.shape[1])
                 # Of those that comply alike the first to end, too.
                 ends = np.broadcast_to(after.sun_pulse, shape).reshape(len(rows), -1)
-                first = np.where(complies(table), ends, np.inf).argmin(axis=1)
-                rest = np.concatenate([rest, first[:, None]], axis=1)
+                soonest = np.where(complies(table), ends, np.inf).argmin(axis=1)
+                rest = np.concatenate([rest, soonest[:, None]], axis=1)
                 pair = np.repeat(np.arange(len(rows)), rest.size // len(rows))
                 rest = rest.ravel()
                 finite = np.isfinite(table[pair, rest])
@@ -347,26 +335,21 @@ class BlockSearch:
             def picked(values: object, at: Any = at, shape: Any = shape) -> Array:
                 return np.asarray(np.broadcast_to(np.asarray(values), shape)[at])
 
-            parent = rows[pair]
-            wait = picked(trial.wait)
-            yield BlockSequences(
-                before,
-                parent,
+            blocks = before.blocks[rows[pair]]
+            first = np.ones(len(pair))
+            if blocks.shape[1]:
+                intervals = np.array([interval for _, interval in self.kinds])
+                number = blocks[:, -1, 0].astype(int)
+                first = blocks[:, -1, 1] + (blocks[:, -1, 4] - 1) * intervals[number] + 1
+            block = [
                 np.full(len(pair), kind),
-                self._following(before, parent) + wait,
+                first + picked(trial.wait),
                 np.round(picked(trial.delay), 12),
                 np.round(picked(trial.width), 12),
                 picked(trial.count),
-                table[pair, rest],
-                after.map(picked),
-            )
-
-    def _following(self, before: BlockSequences, rows: Index) -> Index:
-        """Number of the first Sun pulse after sequences."""
-        every = np.array([every for _, every in self.kinds])[before.kind[rows]]
-        count = before.count[rows]
-        passed = np.where(count > 0, (count - 1) * every + 1, 0)
-        return np.asarray(before.first[rows] + passed)
+            ]
+            blocks = np.concatenate([blocks, np.column_stack(block)[:, None]], axis=1)
+            yield BlockSequences(blocks, table[pair, rest], after.map(picked))
 
     def _barred(
         self, state: BlockState, channel: Channel, trial: Trial, after: BlockState
@@ -497,11 +480,9 @@ class BlockSearch:
         if self.whole:
             order = doubtful[: max(some, 8 * FLOWN)]
         else:
-            largest = np.zeros(len(share))
-            for kind, (channel, _) in enumerate(self.kinds):
-                rows = np.flatnonzero(sequences.kind == kind)
-                turns = self.model.turned_by(channel, sequences.width[rows], self.spacecraft.spin)
-                largest[rows] = turns
+            kind, _, _, width, _ = sequences.blocks[:, -1].T
+            strengths = np.array([abs(channel.transverse) for channel, _ in self.kinds])
+            largest = strengths[kind.astype(int)] * width
             clear = np.argsort(share, kind="stable")
             gentle = clear[: 8 * FLOWN]
             gentle = gentle[np.argsort(largest[gentle], kind="stable")]
@@ -525,29 +506,25 @@ class BlockSearch:
 
     def _fly(self, sequences: BlockSequences, rows: Index) -> Index:
         """Fly rows, and return those that were: the first ones, if all have too many pulses."""
-        pulses = np.cumsum(sequences.pulses(rows))
+        pulses = np.cumsum(sequences.blocks[rows, :, 4].sum(axis=1))
         rows = rows[(pulses <= FLOWN_PULSES) | (np.arange(len(rows)) < 8)]
-        blocks = [self.blocks(sequences, int(row)) for row in rows]
-        for each, row in zip(blocks, rows.tolist(), strict=True):
-            self.rows[each] = sequences, row
-        self.flights.fly(blocks, sequences.cost[rows].tolist())
+        flown = self.blocks(sequences, rows)
+        for blocks, row in zip(flown, rows.tolist(), strict=True):
+            self.rows[blocks] = sequences.state.some([row])
+        self.flights.fly(flown)
         return rows
 
-    def blocks(self, sequences: BlockSequences, row: int) -> Blocks:
-        """Blocks of a row."""
-        if sequences.before is None:
-            return ()
-        channel, every = self.kinds[int(sequences.kind[row])]
-        count = int(sequences.count[row])
-        delay = float(sequences.delay[row])
-        delay, angle = self.commands.after_sun_pulse(delay, self.spacecraft.spin)
-        block = Block(
-            channel.name,
-            int(sequences.first[row]),
-            delay,
-            float(sequences.width[row]),
-            count,
-            every if count > 1 else self.commands.every[0],
-            angle,
-        )
-        return (*self.blocks(sequences.before, int(sequences.parent[row])), block)
+    def blocks(self, sequences: BlockSequences, rows: Index) -> list[Blocks]:
+        """Blocks of rows."""
+        found = list[Blocks]()
+        for row in sequences.blocks[rows].tolist():
+            blocks = list[Block]()
+            for kind, first, delay, width, count in row:
+                channel, every = self.kinds[int(kind)]
+                every = every if count > 1 else self.commands.every[0]
+                delay, angle = self.commands.after_sun_pulse(delay, self.spacecraft.spin)
+                blocks.append(
+                    Block(channel.name, int(first), delay, width, int(count), every, angle)
+                )
+            found.append(tuple(blocks))
+        return found

@@ -15,12 +15,8 @@ from typing import Any, ClassVar, Self, TypeVar
 from nutdamp.errors import BadRequest, SenselessOption, cure_of
 from nutdamp.units import as_given, expect, is_count, is_number
 
-LEAST = (
-    "propellant",
-    "impulse",
-    "time",
-    "pulses",
-)  # quantities that the scheme optimal can minimise
+# quantities that the scheme optimal can minimise
+LEAST = ("propellant", "impulse", "time", "pulses")
 
 
 @dataclass(frozen=True)
@@ -192,11 +188,9 @@ class OptimalOptions(SchemeOptions):
         """Copy with the default freedom of H; a ``shift`` of 0 becomes None."""
         if self.shift is not None:
             return dataclasses.replace(self, free_axis=False, shift=self.shift or None)
-        return (
-            self
-            if self.free_axis is not None
-            else dataclasses.replace(self, free_axis=not keeps_axis)
-        )
+        if self.free_axis is not None:
+            return self
+        return dataclasses.replace(self, free_axis=not keeps_axis)
 
 
 KINDS = (
@@ -264,23 +258,14 @@ class Scheme:
     options: type[SchemeOptions] = SchemeOptions
     fires: bool = True
     classic: bool = False  # of Magnus 1970
-    # can turn the spin axis to a target, and is planned when there is one and none is named
-    points: bool = False
-    only_points: bool = False  # does nothing else, and needs a target
+    points: bool = False  # can turn the spin axis to a target, and is planned where there is one
+    only_points: bool = False  # needs a target
     reads_sun: bool = False  # keeps its pulses at a fixed phase to the Sun
     sets_spin: bool = False  # can change the spin rate
-    weighs_alternatives: bool = (
-        False  # has a function ``alternatives`` too, of schedules about as good
-    )
     body_fixed: bool = False  # fires channels of the file only, no steerable torquer
-    reads_commands: bool = (
-        False  # makes blocks of the ``commands`` of the file, and is planned where there are some
-    )
+    reads_commands: bool = False  # makes blocks of ``commands``; planned where there are some
     on_true_body: bool = False  # needs no symmetric model
-    three_moments: bool = (
-        False  # plans on three moments as they are, and needs a model for lasting torques alone
-    )
-    on_true_motion: bool = False  # has such a function too, for three moments
+    three_moments: bool = False  # needs a model for lasting torques alone
     slow: bool = False  # may take seconds
     by_turns: bool = False  # fires at one phase of each spin turn, so that the body has to spin
     home: str = ""  # its module, where that has another name
@@ -292,12 +277,8 @@ class Scheme:
 
 
 ONE_PULSE = Scheme("one-pulse", classic=True)
-TWO_PULSE = Scheme(
-    "two-pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
-)
-FOUR_PULSE = Scheme(
-    "four-pulse", FourPulseOptions, classic=True, body_fixed=True, on_true_motion=True
-)
+TWO_PULSE = Scheme("two-pulse", TwoPulseOptions, classic=True, points=True)
+FOUR_PULSE = Scheme("four-pulse", FourPulseOptions, classic=True, body_fixed=True)
 OPTIMAL = Scheme(
     "optimal",
     OptimalOptions,
@@ -330,19 +311,8 @@ COMMAND_BLOCK = Scheme(
 )
 NONE = Scheme("none", fires=False)  # free motion, for comparison
 
-SCHEMES = {
-    scheme.name: scheme
-    for scheme in (
-        ONE_PULSE,
-        TWO_PULSE,
-        FOUR_PULSE,
-        OPTIMAL,
-        HALF_CONE,
-        RHUMB_LINE,
-        COMMAND_BLOCK,
-        NONE,
-    )
-}
+ALL = (ONE_PULSE, TWO_PULSE, FOUR_PULSE, OPTIMAL, HALF_CONE, RHUMB_LINE, COMMAND_BLOCK, NONE)
+SCHEMES = {scheme.name: scheme for scheme in ALL}
 NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)

@@ -3,8 +3,8 @@ and number.
 
 Spin and turn are made leg by leg in one row of blocks. The impulse that turns H goes with |H3|: H
 is turned while that is smaller, before the spin is raised or once it is lowered. Trains that turn
-change the spin too where their channels have a torque about axis 3: the spin leg behind them is
-planned on what they leave, one before them ahead by as much.
+change the spin too where their channels have a torque about axis 3: a spin leg behind them is
+planned on what they leave.
 """
 
 from __future__ import annotations
@@ -23,12 +23,16 @@ from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_flights import BlockFlights, FlownSequence
 from nutdamp.schemes.block_model import acts, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, LONGEST, BlockSearch
+from nutdamp.schemes.block_search import (
+    BLOCKS,
+    LONGEST,
+    BlockSearch,
+)
 from nutdamp.schemes.catalogue import CommandBlockOptions
-from nutdamp.schemes.sequential import NO_AXIAL, at_hand
-from nutdamp.schemes.valve_commands import Legs
+from nutdamp.schemes.legs import Legs
+from nutdamp.schemes.sequential import NO_AXIAL
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
+from nutdamp.spacecraft.constraints import OFF_TICK, at_hand, commandable_widths, usable
 from nutdamp.spacecraft.equipment import ANGLE, Block
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
@@ -187,14 +191,11 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
         elif work.exhausted():
             why = "the budget of work was used up before a block was found"
         raise Infeasible(why)
-    chosen = flights.chosen()
+    chosen = flights.best()
     # Flight against closed form.
-    sequences, row = search.rows[chosen.schedule.blocks]
-    form = search.model.left(sequences.state.some(row))
+    form = search.model.left(search.rows[chosen.schedule.blocks])
     flown = left_by(propagation.flown(spacecraft, chosen.schedule))
-    nutation, end = (
-        math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True)
-    )
+    nutation, end = np.degrees(np.abs(np.ravel(form[:2]) - flown[:2])).tolist()
     figures = {"compared": search.looked, "nutation_deg": nutation, "end_deg": end}
     notes = [note("blocks-compared" if search.whole else "blocks-found", **figures)]
     if not requirements.complies(chosen.rank[1]):
@@ -247,10 +248,10 @@ def opposite_blocks(spacecraft: Spacecraft, most: int | None) -> FlownSequence |
     for begin in range(0, len(some), PHASES):
         if not math.isfinite(flights.cheapest) and not work.exhausted():
             batch = some[begin : begin + PHASES]
-            flights.fly(batch, [0.0] * len(batch))
+            flights.fly(batch)
     if not flights.of:
         return None
-    chosen = flights.chosen()
+    chosen = flights.best()
     shares = flights.shares(left_by(propagation.flown(spacecraft, chosen.schedule)))
     shares.pop(Part.NUTATION, None)
     if chosen.rank[0] or not all(map(requirements.complies, shares.values())):
@@ -301,7 +302,7 @@ def spin_and_turn(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
                 if turning and number == 1 and not requirements.spins_at(legs.at_leg, goal):
                     gained = legs.at_leg.spin - at_leg.spin
             if legs.blocks:
-                flights.fly([tuple(legs.blocks)], [0.0])
+                flights.fly([tuple(legs.blocks)])
         except Infeasible as reason:
             reasons.append(reason)
         if math.isfinite(flights.cheapest) or work.exhausted():

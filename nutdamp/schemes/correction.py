@@ -12,10 +12,10 @@ too, but loading it takes longer than a whole plan.
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +43,6 @@ INTEGRATED = 50_000  # steps of integration after which a correction stops: some
 # least relative gain of a step; near a solution each step gains many digits, so less means a bound
 # in the way
 PROGRESS = 0.01
-# largest residual, over that of an earlier candidate, with which a later or dearer one is taken
-CLEARLY = 0.5
 # pulses up to which a schedule is corrected on the true motion: a correction flies all of them some
 # twenty times
 MOST_CORRECTED = 1_000
@@ -61,20 +59,9 @@ TAIL = 4
 # turns)
 ALIGNED = 1e-9
 
-# fraction of the nutation below which pulses have nothing to do: dissipation has removed it
-FADED = 1e-6
-
 # Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of
 # given length so many before the equal ones, which damp the nutation, and at the end.
 MOVED, BEFORE, AFTER = 8, 12, 24
-
-EXACT = (
-    1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
-)
-
-# Factors of cost and miss within which candidates count as equal: of those the one that ends first
-# is preferred.
-CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,62 +219,6 @@ def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     return steady
 
 
-class PairCandidate(NamedTuple):
-    """Two channels with centre and on-time (s) of a pulse of each, which close to first order."""
-
-    cost: float
-    end: float
-    channels: tuple[Channel, Channel]
-    timing: tuple[tuple[float, float], tuple[float, float]]
-    short: float = 0.0  # part of the impulse out of reach
-    miss: float = 0.0  # ψ, rad
-    factor: float = 1.0  # impulse over A|ω0|
-
-    def fired(self, spacecraft: Spacecraft) -> Schedule:
-        """The two pulses, commandable."""
-        pairs = zip(self.channels, self.timing, strict=True)
-        return Schedule(
-            tuple(
-                commandable(spacecraft, channel_pulse(channel, *timing))
-                for channel, timing in pairs
-            )
-        )
-
-
-def shortlist(candidates: Iterable[PairCandidate], near: int, most: int) -> list[PairCandidate]:
-    """At most ``most`` candidates to fly: up to ``near`` that are about the best, by their ends,
-    then the others.
-    """
-    ranked = sorted(candidates, key=lambda candidate: (candidate.short, candidate.cost))
-    if not ranked:
-        return []
-    short, cost = ranked[0].short * CLOSE_IN_SHORT, ranked[0].cost * CLOSE_IN_COST
-    alike = [
-        candidate for candidate in ranked if candidate.short <= short and candidate.cost <= cost
-    ]
-    others = [candidate for candidate in ranked if candidate.short > short or candidate.cost > cost]
-    return [*sorted(alike, key=lambda candidate: candidate.end)[:near], *others][:most]
-
-
-def best_of(
-    spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]
-) -> tuple[Schedule | None, Schedule | None]:
-    """First schedule that is exact, else that none behind beats clearly, by residuals (rad); first
-    to break a limit.
-    """
-    least = math.inf
-    best = None
-    broken = None
-    for schedule, left in tried:
-        if not keeps_limits(spacecraft, schedule.pulses):
-            broken = broken or schedule
-        elif left < CLEARLY * least:
-            least, best = left, schedule
-            if left <= EXACT:
-                break
-    return best, broken
-
-
 def left(spacecraft: Spacecraft, schedule: Schedule, *, momentum: bool = True) -> float:
     """Size of the residual of a flown schedule, rad; without ``momentum`` of the nutation alone."""
     missed = _missed(propagation.flown(spacecraft, schedule))
@@ -338,29 +269,50 @@ def correct(
     """
     if not schedule.pulses:
         return schedule
-    indices = {index % len(schedule) for index in chosen}
     size = _size(schedule.pulses[-1])
+    same = np.array([equal and alike(schedule, pulse) for pulse in schedule])
     together = equal and resizable and spacecraft.limits.tick is None and size > 0.0
-    kept, parts = list[Pulse](), list[_Movable]()
-    for index, pulse in enumerate(schedule):
-        same = equal and alike(schedule, pulse)
-        if index in indices or (together and same):
-            parts.append(_Movable(spacecraft, pulse, moves=index in indices, sized=not same))
-        else:
-            kept.append(pulse)
-    free = np.concatenate([part.free for part in parts])
+    moves = np.zeros(len(schedule), dtype=bool)
+    moves[list(chosen)] = True
+    # Start s, angle rad of a steerable pulse, and size of each, its natural size, and bounds.
+    channels = [channel_of(spacecraft, pulse) for pulse in schedule]
+    settings, lower, upper = np.zeros((3, len(schedule), 3))
+    for index, (pulse, channel) in enumerate(zip(schedule, channels, strict=True)):
+        angle = math.atan2(pulse.impulse[1], pulse.impulse[0])
+        shortest, longest = 0.0, math.inf
+        if channel is not None:
+            shortest = effective_on_times(channel)[0]
+            longest = max(longest_on_time(spacecraft, channel), pulse.on_time)
+        earliest = spacecraft.limits.earliest + pulse.start - pulse.loaded[0]
+        latest = spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end)
+        settings[index] = pulse.start, angle, _size(pulse)
+        lower[index] = earliest, -math.inf, shortest
+        upper[index] = max(latest, pulse.start), math.inf, longest
+    scale = np.ones_like(settings)
+    scale[:, 0], scale[:, 2] = 1.0 / spacecraft.fastest, settings[:, 2]
+    steerable = np.array([channel is None for channel in channels])
+    mask = np.column_stack([moves, moves & steerable, moves & ~same])
+    free = np.column_stack([each[mask] for each in (settings, scale, lower, upper)])
     if together:  # and the common factor of the equal ones
-        bounds = np.array([part.bounds for part in parts if not part.sized]) / size
-        free = np.concatenate([free, [(1.0, 1.0, bounds[:, 0].max(), bounds[:, 1].min())]])
-    ends = np.cumsum([len(part.free) for part in parts])
+        bounds = lower[same, 2].max() / size, upper[same, 2].min() / size
+        free = np.concatenate([free, [(1.0, 1.0, *bounds)]])
+    count = int(mask.sum())
     steps = 0
     dynamics = make_dynamics(spacecraft).remembering()
 
     def build(x: Vector) -> Schedule:
-        *own, common = np.split(x, ends)
-        factor = float(common[0]) if together else 1.0
-        turned = (part.turn(one, factor) for part, one in zip(parts, own, strict=True))
-        return Schedule(supplied(spacecraft, (*kept, *turned)), schedule.notes, schedule.bounds)
+        moved = settings.copy()
+        moved[mask] = x[:count]
+        if together:
+            moved[same, 2] *= x[-1]
+        moved[~moves, 0] += 0.5 * (settings - moved)[~moves, 2]  # about their centres
+        pulses = [
+            _pulse(spacecraft, channel, *setting) if changed else pulse
+            for pulse, channel, setting, changed in zip(
+                schedule, channels, moved.tolist(), moves | (same & together), strict=True
+            )
+        ]
+        return Schedule(supplied(spacecraft, pulses), schedule.notes, schedule.bounds)
 
     def left(schedule: Schedule) -> Vector:
         nonlocal steps
@@ -426,52 +378,16 @@ def alike(schedule: Schedule, pulse: Pulse) -> bool:
     return abs(size - other) <= ALIKE * other
 
 
-class _Movable:
-    """Pulse with free parameters: (start, on-time) of a channel, (start, angle, impulse) of a
-    steerable torquer.
-
-    The last one only if it is ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper
-    bound.
-    """
-
-    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, moves: bool, sized: bool) -> None:
-        pace = 1.0 / spacecraft.fastest
-        earliest = spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
-        latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
-        self.pulse, self.channel, self.torquer = (
-            pulse,
-            channel_of(spacecraft, pulse),
-            spacecraft.torquer,
-        )
-        self.moves, self.sized, self.size = moves, sized, _size(pulse)
-        self.bounds = 0.0, math.inf
-        self.given = [(pulse.start, pace, earliest, latest)]
-        if self.channel is None:
-            self.given.append(
-                (math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf)
-            )
-        else:
-            longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
-            self.bounds = effective_on_times(self.channel)[0], longest
-        if sized:
-            self.given.append((self.size, self.size, *self.bounds))
-        self.free = np.array(self.given if moves else []).reshape(-1, 4)
-
-    def turn(self, x: Vector, factor: float) -> Pulse:
-        """Pulse with these settings; ``factor`` times as large, about its centre, where it is not
-        sized for itself.
-        """
-        start, *others = x if self.moves else [start for start, *_ in self.given]
-        size = float(others[-1]) if self.sized else factor * self.size
-        if self.channel is not None:
-            pulse = channel_pulse(self.channel, start + 0.5 * size, size)
-        else:
-            assert self.torquer is not None
-            on_time = 0.0 if self.torquer.torque is None else size / self.torquer.torque
-            pulse = steerable_pulse(
-                self.torquer, start + 0.5 * on_time, float(others[0]), impulse=size
-            )
-        return pulse if self.moves else replace(pulse, t=self.pulse.t)
+def _pulse(
+    spacecraft: Spacecraft, channel: Channel | None, start: float, angle: float, size: float
+) -> Pulse:
+    """Pulse with these settings, as in `correct`."""
+    if channel is not None:
+        return channel_pulse(channel, start + 0.5 * size, size)
+    torquer = spacecraft.torquer
+    assert torquer is not None
+    on_time = 0.0 if torquer.torque is None else size / torquer.torque
+    return steerable_pulse(torquer, start + 0.5 * on_time, angle, impulse=size)
 
 
 def _size(pulse: Pulse) -> float:
@@ -550,3 +466,27 @@ def tolerable(spacecraft: Spacecraft) -> float:
     """
     share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
+
+
+def components(channels: list[Channel], target: complex) -> list[tuple[Channel, float]]:
+    """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else
+    the nearest.
+    """
+    best: list[tuple[Channel, float]] = []
+    least = math.inf
+    for left, right in itertools.combinations(channels, 2):
+        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (left, right))
+        area = (d1.conjugate() * d2).imag
+        if abs(area) < 1e-9:
+            continue
+        first, second = (target.conjugate() * d2).imag / area, (d1.conjugate() * target).imag / area
+        if min(first, second) >= -1e-12 * abs(target) and first + second < least:
+            least = first + second
+            best = [(left, first), (right, second)]
+    if not best:
+        along = [
+            (target * channel.transverse.conjugate()).real / abs(channel.transverse)
+            for channel in channels
+        ]
+        best = [max(zip(channels, along, strict=True), key=lambda share: share[1])]
+    return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]

@@ -5,28 +5,19 @@ T_ω/4.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from nutdamp.common import work
 from nutdamp.errors import Infeasible, span
-from nutdamp.flight import propagation
 from nutdamp.schemes.catalogue import DEFAULT_SHARE, FourPulseOptions
-from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
+from nutdamp.schemes.sequential import ImpulseBuilder, fire_components, no_alignment
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Windows, usable, without_waste
+from nutdamp.spacecraft.constraints import at_hand, usable, without_waste
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
-
-if TYPE_CHECKING:
-    from nutdamp.schemes.valve_commands import FlownBuilder
+from nutdamp.spacecraft.schedule import Schedule
 
 # share of the nutation allowed that channels left out may leave: the tolerances need the other half
 FILLED = 0.5
-MOST_FLOWN = 200  # pulses that are laid one by one on the true motion, at most
 
 
 # End of a schedule without the channels that waste, over that with all, up to which it is taken
@@ -58,7 +49,7 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     laid = [builder for builder in builders if builder.pulses]
     if not laid:
         raise no_alignment(spacecraft, channels)
-    enough = [builder.schedule() for builder in laid if _suffices(spacecraft, builder.nutation)]
+    enough = [builder.schedule() for builder in laid if suffices(spacecraft, builder.nutation)]
     if enough:
         soonest = min(schedule.end for schedule in enough)
         if spacecraft.dispersions is not None:
@@ -76,10 +67,10 @@ def _fired(
     """Pulses of the channels that are ``first``, then of all where those leave too much."""
     builder = ImpulseBuilder(spacecraft)
     on_times = {
-        channel.name: _on_time(builder.period, channel, options.on_time) for channel in channels
+        channel.name: full_on_time(builder.period, channel, options.on_time) for channel in channels
     }
     for firing in (first, channels):
-        enough = options.coarse and _suffices(spacecraft, builder.nutation)
+        enough = options.coarse and suffices(spacecraft, builder.nutation)
         if builder.pulses and enough:
             break
         while not builder.full and not builder.settled:  # whichever helpful channel comes first
@@ -97,84 +88,13 @@ def _fired(
     return builder
 
 
-def _suffices(spacecraft: Spacecraft, nutation: float) -> bool:
+def suffices(spacecraft: Spacecraft, nutation: float) -> bool:
     """True if a ``nutation`` (rad) uses no more than `FILLED` of what is allowed at the end."""
     bounds = requirements.bounds(spacecraft)
     return all(bound.met(nutation / FILLED) for bound in bounds if bound.part is Part.NUTATION)
 
 
-# moments in a period at which pulses are looked at, shares of a full one
-LOOKS = 240
-SHARES = 0.88 ** np.arange(40)
-LIKE, LEFT = (
-    0.5,
-    1e-4,
-)  # share of the largest gain with which an earlier pulse is fired; rad left to correction
-
-
-def on_true_motion(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
-    """The law of ideal rate gyros for three moments, whose large nutation turns unevenly and at a
-    rate of its own.
-
-    Each pulse is one that lowers, as an impulse, the largest nutation of the motion that follows
-    most. Channels that waste fire only where the others leave too much.
-    """
-    channels = at_hand(spacecraft, usable(spacecraft))
-    thrifty = without_waste(spacecraft, channels)
-    builder = _fired_on_true_motion(spacecraft, options, thrifty)
-    if len(thrifty) < len(channels) and not _suffices(spacecraft, builder.at_leg.nutation):
-        other = _fired_on_true_motion(spacecraft, options, channels)
-        builder = min(builder, other, key=lambda each: each.at_leg.nutation)
-    return builder.schedule()
-
-
-def _fired_on_true_motion(
-    spacecraft: Spacecraft, options: FourPulseOptions, channels: list[Channel]
-) -> FlownBuilder:
-    """Pulses of the ``channels``, each the one to fire next within a period of the motion, until
-    none lowers the nutation.
-    """
-    from nutdamp.physics.triaxial import widest_cones
-    from nutdamp.schemes.valve_commands import FlownBuilder
-
-    builder = FlownBuilder(spacecraft)
-    count = spacecraft.limits.max_pulses or MOST_FLOWN
-    while len(builder.pulses) < count and builder.at_leg.nutation > LEFT and not work.exhausted():
-        at_leg = builder.at_leg
-        windows = Windows(at_leg)
-        earliest = at_leg.limits.earliest
-        moments = np.tile(np.array(at_leg.inertia.moments)[:, None], LOOKS)
-        period = min(at_leg.motion_period, at_leg.horizon)
-        times = earliest + np.linspace(0.0, period, LOOKS)
-        rates = propagation.flown(at_leg, Schedule(), float(times[-1])).motion(times)[0].T
-        best = list[tuple[float, Pulse]]()
-        for channel in channels:
-            full = _on_time(period, channel, options.on_time)
-            tried = list[tuple[float, float, float]]()
-            for on_time in dict.fromkeys(
-                windows.on_time(full * share, channel.min_on_time, full) for share in SHARES
-            ):
-                after = rates + channel.torque[:, None] * on_time / moments
-                left = widest_cones(moments, after, at_leg.sense, at_leg.inertia.wheel)[0]
-                starts = times - 0.5 * on_time
-                left[~windows.allowed(starts, np.full(LOOKS, on_time), earliest)] = math.inf
-                at = int(np.argmin(left))
-                tried.append((float(left[at]), float(times[at]), on_time))
-            left_over, t, on_time = min(tried)
-            best.append((at_leg.nutation - left_over, channel_pulse(channel, t, on_time)))
-        largest = max(gain for gain, _ in best)
-        if largest <= 0.0:
-            break
-        good = [pulse for gain, pulse in best if gain >= LIKE * largest]
-        after_pulse = builder.fork()
-        after_pulse.fire([min(good, key=lambda pulse: pulse.t)])
-        if after_pulse.at_leg.nutation >= at_leg.nutation:
-            break
-        builder = after_pulse
-    return builder
-
-
-def _on_time(period: float, channel: Channel, requested: float | None) -> float:
+def full_on_time(period: float, channel: Channel, requested: float | None) -> float:
     """Length of a full pulse of ``channel``, s."""
     if requested is None:
         return max(min(channel.max_on_time, DEFAULT_SHARE * period), channel.min_on_time)

@@ -16,13 +16,13 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.flight.dynamics import Arc
+from nutdamp.flight.dynamics import free_coast
 from nutdamp.physics import attitude, precession
-from nutdamp.schemes import one_pulse, pulse_pairs
+from nutdamp.schemes import pulse_pairs
 from nutdamp.schemes.catalogue import HalfConeOptions
+from nutdamp.schemes.legs import Legs, damped
 from nutdamp.schemes.pulse_pairs import SteerablePair
-from nutdamp.schemes.sequential import expect_aim, turn_of
-from nutdamp.schemes.valve_commands import FlownBuilder
+from nutdamp.schemes.sequential import expect_aim, reach, strongest_turn
 from nutdamp.spacecraft.constraints import Windows, commandable, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -50,95 +50,71 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     Infeasible.
     """
     expect_aim(spacecraft)
-    builder = FlownBuilder(spacecraft)
-    if math.tan(spacecraft.nutation) > _reach(spacecraft) / abs(spacecraft.axial):
-        builder = one_pulse.damped(builder)
+    legs = Legs(spacecraft)
+    if math.tan(spacecraft.nutation) > reach(spacecraft) / abs(spacecraft.axial):
+        legs = damped(legs)
     if options.cones is not None:
-        return _row(builder, options.cones)
-    best: Schedule | None = None
-    reasons = list[Infeasible]()
-    at_leg = builder.at_leg
-    reach = _reach(at_leg)
+        return _row(legs, options.cones)
+    at_leg = legs.at_leg
+    limits = at_leg.limits
     turn = max(at_leg.to_turn - at_leg.nutation, 0.0)
-    pulses = (
-        (cones, (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones)))
-        for cones in range(1, MOST_CONES)
-    )
-    fewest = next(
-        (cones for cones, pulse in pulses if 0.0 <= pulse <= reach / abs(at_leg.axial)), MOST_CONES
+    most_turned = reach(at_leg) / abs(at_leg.axial)
+    fewest = 1 if math.tan(0.5 * turn) <= most_turned else MOST_CONES
+    if fewest > 1 and most_turned > 0.0:
+        fewest = min(max(math.ceil(turn / (2.0 * math.atan(0.5 * most_turned))), 2), MOST_CONES)
+    half_turn = math.pi * at_leg.inertia.A / abs(at_leg.axial)
+    most = min(MOST_CONES, int(max(at_leg.horizon - limits.earliest, 0.0) / half_turn) + 1)
+    if limits.max_pulses is not None:
+        most = min(most, limits.max_pulses - 1)
+    if limits.max_pulses is not None and limits.max_pulses <= fewest:
+        raise Infeasible(
+            f"{fewest} half cones take {fewest + 1} pulses at least, "
+            f"and limits.max_pulses allows {limits.max_pulses}"
+        )
+    best: Schedule | None = None
+    reason: Infeasible = TooShort(
+        f"the target takes at least {fewest} half cones, each half a nutation turn of "
+        f"{half_turn:.4g} s, and there are at most {max(most, 0)} within the limits; "
+        f"{strongest_turn(at_leg)}"
     )
     cones = fewest
-    allowed = at_leg.limits.max_pulses
-    horizon = at_leg.horizon
-    half_turns = int(
-        max(horizon - at_leg.limits.earliest, 0.0)
-        / (math.pi * at_leg.inertia.A / abs(at_leg.axial))
-    )
-    while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
+    failed = 0
+    while cones <= most and failed <= PATIENCE:
         try:
-            row = _row(builder.fork(), cones)
+            row = _row(legs.fork(), cones)
+        except Infeasible as why:
+            reason = why
+            failed = failed + 1 if best is None else PATIENCE + 1
+        else:
             if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
                 break
             best = row
-        except Infeasible as why:
-            reasons.append(why)
-            if best is not None or len(reasons) > PATIENCE:
-                break
         if work.exhausted():
             break
         cones += 1 + cones // 6  # where there are many, in steps of a sixth
-    if best is not None:
-        return best
-    if reasons:
-        raise reasons[-1]
-    if allowed is not None and allowed < fewest + 1:
-        raise Infeasible(
-            f"{fewest} half cones take {fewest + 1} pulses at least, "
-            f"and limits.max_pulses allows {allowed}"
-        )
-    if fewest >= MOST_CONES:
-        raise Infeasible(
-            f"one pulse turns H by {turn_of(at_leg, reach)} at most, so the target takes "
-            f"more than {MOST_CONES} half cones; use rhumb-line, with many small pulses"
-        )
-    raise TooShort(
-        f"at least {fewest} half cones are needed, each half a nutation turn long; the "
-        f"{horizon:.4g} s up to limits.horizon are too short"
-    )
+    if best is None:
+        raise reason
+    return best
 
 
-def _reach(spacecraft: Spacecraft) -> float:
-    """Most by which one pulse turns H, N m s."""
-    torquer, spin = spacecraft.torquer, spacecraft.spin
-    if torquer is not None:
-        return (
-            math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
-        )
-    channels = usable(spacecraft)
-    return max(
-        (precession.reach(abs(each.transverse), spin, each.max_on_time) for each in channels),
-        default=0.0,
-    )
-
-
-def _row(builder: FlownBuilder, cones: int) -> Schedule:
+def _row(legs: Legs, cones: int) -> Schedule:
     """Row of half cones, each planned from the motion that the one before leaves."""
-    spacecraft = builder.at_leg
-    damped = len(builder.pulses)
+    spacecraft = legs.at_leg
+    damped = len(legs.pulses)
     most = spacecraft.limits.max_pulses
     if most is not None and most < cones + 1:
         raise Infeasible(
             f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {most}"
         )
     for remaining in range(cones, 1, -1):
-        at_leg = builder.at_leg
+        at_leg = legs.at_leg
         steered = (
             None if at_leg.torquer is None else SteerablePair(at_leg, at_leg.torquer).one(remaining)
         )
-        builder.fire(steered or (_fixed(at_leg, remaining),))
-    builder.fire(pulse_pairs.schedule(builder.at_leg, straight=True))
+        legs.fire(steered or (_fixed(at_leg, remaining),))
+    legs.fire(pulse_pairs.schedule(legs.at_leg))
     angle = spacecraft.to_turn
-    schedule = builder.schedule()
+    schedule = legs.schedule()
     if (
         len(schedule) == cones + 1
         and not damped
@@ -147,8 +123,8 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     ):
         ideal = precession.half_cones_impulse(abs(spacecraft.axial), angle, cones)
         ratio = f"{schedule.total_impulse / ideal:.4f}"
-        return builder.schedule(note("half-cones-ideal", cones=cones, ideal_Nms=ideal, ratio=ratio))
-    return builder.schedule(note("half-cones", cones=cones, damping=damped))
+        return legs.schedule(note("half-cones-ideal", cones=cones, ideal_Nms=ideal, ratio=ratio))
+    return legs.schedule(note("half-cones", cones=cones, damping=damped))
 
 
 def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
@@ -162,14 +138,14 @@ def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
     span = min(max(room / (cones + 1), at_leg.inertial_period), room)
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(at_leg.limits.earliest + np.arange(count) * step, dtype=np.float64)
-    _, quaternions = Arc.of(at_leg.inertia, at_leg.initial).motion(times)
+    _, quaternions = free_coast(at_leg.inertia, at_leg.initial).motion(times)
     # Half-angle, rad, of equal cones from the best point of the present one, and the pulse for it,
     # N m s.
     equal = min((at_leg.to_turn + at_leg.nutation) / (2 * cones), 1.0)
     h = abs(at_leg.axial)
     nominal = h * (math.tan(at_leg.nutation) + math.tan(equal))
-    reach = _reach(at_leg)
-    sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * reach))
+    most = reach(at_leg)
+    sizes = np.unique(np.minimum(nominal * SHARES, 0.999 * most))
     strongest = max((abs(each.transverse) for each in channels), default=0.0)
     widest = 0.999 * precession.reach(strongest, at_leg.spin, math.inf)
 
@@ -200,7 +176,7 @@ def _fixed(at_leg: Spacecraft, cones: int) -> Pulse:
             # Cones may differ by so much for a channel to be in phase, but the last must not have
             # too much to do.
             unlike = np.abs(half_angle - equal) > UNEQUAL * equal
-            costs[unlike | (rest > LAGGING * equal) | (ahead + last > 1.02 * reach)] = np.inf
+            costs[unlike | (rest > LAGGING * equal) | (ahead + last > 1.02 * most)] = np.inf
             better = costs < best
             best[better], on_times[better] = costs[better], on_time
         best[~windows.allowed(times - 0.5 * on_times, on_times, at_leg.limits.earliest)] = np.inf

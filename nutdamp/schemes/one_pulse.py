@@ -5,28 +5,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-from nutdamp.common import work
-from nutdamp.errors import Infeasible, TooShort
+from nutdamp.errors import TooShort
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import SchemeOptions
-from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, fire_components, no_alignment
-from nutdamp.spacecraft.constraints import longest_useful, usable
+from nutdamp.schemes.sequential import ImpulseBuilder, fire_components, no_alignment
+from nutdamp.spacecraft.constraints import at_hand, longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import Schedule
-
-if TYPE_CHECKING:
-    from nutdamp.schemes.valve_commands import FlownBuilder
 
 TRAIN_SHARE = (
     0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width
 )
-
-PREDAMPING_INTEGRATED = 20_000  # steps of integration after which no more of them are tried
-IN_REACH = 0.5  # share of the horizon within which the damping begins: the rest is for the turn
 
 LEFT_OVER = 0.01  # share of A|ω0| from which a remainder counts against a channel
 
@@ -122,57 +113,3 @@ def _train(spacecraft: Spacecraft, actuator: Channel | Steerable) -> ImpulseBuil
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.
         train = min(train, fired(count + 1), key=lambda train: train.left)
     return train
-
-
-def damped(start: FlownBuilder) -> FlownBuilder:
-    """The ``start``, after the damping by one pulse or a train, from which the rest of the way
-    costs least.
-
-    H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn
-    that is left, C|ω3| times its angle, differs by the cone. Raises Infeasible where no channel can
-    damp, or the budget ends before.
-    """
-    at_leg = start.at_leg
-    steps = 0
-    # A torquer can fire at any point of the cone; channels at their alignments, which come by the
-    # body period.
-    span = (
-        at_leg.inertial_period
-        if at_leg.torquer is not None
-        else 4.0 * min(at_leg.body_period, 0.1 * at_leg.horizon)
-    )
-    best: tuple[float, FlownBuilder] | None = None
-    reason: Infeasible | None = None
-    moments = 16  # earliest starts that are tried
-    for number in range(moments):
-        earliest = at_leg.limits.earliest + number * span / moments
-        if number > 0 and earliest > IN_REACH * at_leg.horizon:  # the rest is for the turn
-            break
-        try:
-            damping = schedule(with_limits(at_leg, earliest=earliest), SchemeOptions())
-        except Infeasible as why:
-            reason = why
-            continue
-        builder = start.fork()
-        try:
-            builder.fire(damping, bounded=True)
-        except Infeasible as why:
-            reason = why
-            break
-        cost = damping.total_impulse + abs(at_leg.axial) * (
-            builder.at_leg.to_turn + 2.0 * builder.at_leg.nutation
-        )
-        if best is None or cost < best[0]:
-            best = cost, builder
-        steps += builder.steps
-        if steps > PREDAMPING_INTEGRATED or work.exhausted():
-            break
-    if best is None:
-        text = "the nutation is to be taken out first, and"
-        # Its cure, where it has one, is for the damping alone.
-        raise (
-            TooShort(f"{text} {reason.why}")
-            if isinstance(reason, TooShort)
-            else Infeasible(f"{text} {reason}")
-        )
-    return best[1]

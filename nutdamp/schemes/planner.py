@@ -9,10 +9,17 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 
-from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
+from nutdamp.schemes.catalogue import (
+    POINTING,
+    SCHEMES,
+    TWO_PULSE,
+    FourPulseOptions,
+    Options,
+    Scheme,
+    SchemeOptions,
+)
 from nutdamp.schemes.correction import Correction, SymmetricModel, left, model_of
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft
@@ -22,9 +29,8 @@ from nutdamp.units import instance
 # rad that a schedule laid on the symmetric body leaves from which one is laid on the true motion
 MODELLED = 1e-6
 
-Choice = (
-    Options | SchemeOptions | None
-)  # options of one scheme, of several, or None for the defaults
+# Options of one scheme, of several, or None for the defaults.
+Choice = Options | SchemeOptions | None
 
 
 def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOptions:
@@ -63,9 +69,7 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     if scheme.on_true_body:
         return planned(spacecraft, chosen)
     if spacecraft.thrust_laws:
-        from nutdamp.schemes import (
-            valve_commands,  # here: few thrusters have valves, tanks or cold nozzles
-        )
+        from nutdamp.schemes import valve_commands  # valves, tanks or cold nozzles
 
         on_plain = valve_commands.options(spacecraft, chosen)
         correct = Correction(scheme, on_plain)
@@ -76,24 +80,24 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     try:
         whole = planned(model.symmetric, chosen)
     except TooShort as short:
-        from nutdamp.schemes.sequential import longer_horizon  # no plan
+        from nutdamp.schemes.sequential import why  # no plan
 
         def attempt(limited: Spacecraft) -> Schedule | None:
             with suppress(Infeasible):
                 return planned(limited, chosen)
             return None
 
-        with work.cure("a longer horizon"):
-            cure = short.cure or longer_horizon(model.symmetric, attempt).text
-        raise TooShort(short.why, cure) from None
+        raise TooShort(short.why, short.cure or why(model.symmetric, attempt).text) from None
     made = _corrected(scheme, model, whole, chosen)
-    unlike = scheme.on_true_motion and not (spacecraft.inertia.symmetric or spacecraft.disturbances)
-    if not unlike or chosen.uncorrected:
+    like_model = spacecraft.inertia.symmetric or spacecraft.disturbances or chosen.uncorrected
+    if like_model or not isinstance(chosen, FourPulseOptions):
         return made
     remains = left(spacecraft, made, momentum=False)
     if not remains > MODELLED:
         return made
-    on_true = import_module(scheme.module).on_true_motion(spacecraft, chosen)
+    from nutdamp.schemes import legs  # three moments
+
+    on_true = legs.on_true_motion(spacecraft, chosen)
     other = Correction(scheme, chosen)(spacecraft, on_true)
     less = left(spacecraft, other, momentum=False) < remains
     return other if less and keeps_limits(spacecraft, other.pulses) else made
@@ -106,13 +110,11 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
     Raises KeyError for a name not in `NAMES`.
     """
     scheme = SCHEMES[name]
-    if not scheme.weighs_alternatives:
+    if scheme is not TWO_PULSE:
         return []
     chosen = settled(scheme, options, spacecraft)
     if spacecraft.thrust_laws:
-        from nutdamp.schemes import (
-            valve_commands,  # here: few thrusters have valves, tanks or cold nozzles
-        )
+        from nutdamp.schemes import valve_commands  # valves, tanks or cold nozzles
 
         schedules = alternatives(
             name,
@@ -133,9 +135,7 @@ def as_commands(
 
     Raises KeyError for a name not in `NAMES`.
     """
-    from nutdamp.schemes import (
-        valve_commands,  # here: few thrusters have valves, tanks or cold nozzles
-    )
+    from nutdamp.schemes import valve_commands  # valves, tanks or cold nozzles
 
     scheme = SCHEMES[name]
     chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))

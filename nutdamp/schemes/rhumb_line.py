@@ -23,13 +23,12 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, span
-from nutdamp.flight.dynamics import Arc
+from nutdamp.flight.dynamics import free_coast
 from nutdamp.physics import attitude, precession
-from nutdamp.schemes import correction, one_pulse
 from nutdamp.schemes.catalogue import RhumbLineOptions
 from nutdamp.schemes.correction import ROUNDING, tolerable
+from nutdamp.schemes.legs import Legs, damped
 from nutdamp.schemes.sequential import expect_aim
-from nutdamp.schemes.valve_commands import FlownBuilder
 from nutdamp.spacecraft.constraints import Windows, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -50,7 +49,6 @@ WIDEST_BEND = 1.3  # rad by which the heading of a train may differ from the cou
 # pulses up to which their size is corrected on the flown motion too: a longer train has little to
 # spare
 SHORT = 60
-OTHERS = 4  # other lengths of the pulses that are tried where the one requested does not do
 
 STEP = math.radians(2.0)  # angle that one ideal impulse turns H by, at most
 
@@ -77,7 +75,6 @@ class Attempt(NamedTuple):
     pulses: int
     size: float  # of each, s; of ideal impulses N m s
     closes: bool  # whether they leave little nutation as they are, so that correction costs little
-    resizable: bool = False  # whether the size is not that of a command, and may be corrected
 
 
 class Train:
@@ -89,63 +86,28 @@ class Train:
         self.turn = 2.0 * math.pi / abs(at_leg.spin)
         self.h = abs(at_leg.axial)
         torquer = at_leg.torquer
-        self.channels = list[Channel]()
-        self.shortest = 0.0
-        self.longest = math.inf
+        self.channels = [] if torquer is not None else _different(at_leg, options.per_turn)
+        torques = [abs(channel.transverse) for channel in self.channels]
         if torquer is not None:
-            self.torque = math.inf if torquer.torque is None else torquer.torque
-        else:
-            # Of directions as different as can be, the one that costs least for its torque first.
-            channels = usable(at_leg)
-            count = options.per_turn
-            if not channels:
-                raise Infeasible("no time is left for the turn after the nutation is damped")
-            self.channels = [
-                min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))
-            ]
-            while len(self.channels) < count:
-                off = [
-                    min(
-                        abs(cmath.phase(each.transverse * other.transverse.conjugate()))
-                        for other in self.channels
-                    )
-                    for each in channels
-                ]
-                if max(off) < 0.2:
-                    raise Infeasible(
-                        f"{count} pulses a spin turn need {count} channels of different "
-                        f"directions, because each passes the phase once a turn; "
-                        f"there are {len(self.channels)}"
-                    )
-                self.channels.append(channels[off.index(max(off))])
-            self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(
-                self.channels
-            )
-            self.shortest = max(channel.min_on_time for channel in self.channels)
-            self.longest = min(channel.max_on_time for channel in self.channels)
+            torques = [math.inf if torquer.torque is None else torquer.torque]
+        self.torque = math.fsum(torques) / len(torques)
+        self.shortest = max((channel.min_on_time for channel in self.channels), default=0.0)
+        self.longest = min((channel.max_on_time for channel in self.channels), default=math.inf)
         self.ideal = math.isinf(self.torque)
-        self.widest = min(
-            self.longest, WIDEST * self.turn
-        )  # s, that is worth firing unless a longer one is given
-        given = options.on_time
-        self.on_time = (
-            max(min(self.longest, TURN_SHARE * self.turn), self.shortest)
-            if given is None
-            else given
-        )
+        # s, that is worth firing unless a longer one is requested
+        self.widest = min(self.longest, WIDEST * self.turn)
+        requested = options.on_time
+        self.on_time = requested or max(min(self.longest, TURN_SHARE * self.turn), self.shortest)
         name = f"the shortest pulse, {self.shortest:.4g} s,"
-        if given is not None:
-            name = f"an on-time of {given:.4g} s"
+        if requested is not None:
+            name = f"an on-time of {requested:.6g} s"
             if self.ideal:
                 raise Infeasible("ideal impulses have no on-time; give the torquer a torque")
-            if not self.shortest <= given <= self.longest:
+            if not self.shortest <= requested <= self.longest:
                 allowed = span(self.shortest, self.longest, "s")
                 raise Infeasible(f"{name} is outside what the channels allow: {allowed}")
-            if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
-                tick = self.at_leg.limits.tick
-                raise Infeasible(
-                    f"an on-time of {given:.6g} s is no multiple of the tick of {tick:.4g} s"
-                )
+            if abs(self.windows.nearest_tick(requested) - requested) > TOUCHING:
+                raise Infeasible(f"{name} is no multiple of the tick of {at_leg.limits.tick:.4g} s")
         if not self.ideal and self.on_time > 0.5 * self.turn:
             raise Infeasible(
                 f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s): after that a "
@@ -155,112 +117,85 @@ class Train:
             at_leg.momentum, at_leg.target_axis, at_leg.goal.sun
         )
         self.needed = self.h * self.way  # turn of H, N m s
-        self.strongest = self.turns_by(
-            STEP * self.h if self.ideal else self.on_time
-        )  # turn by a full pulse, N m s
-        most = at_leg.limits.max_pulses
-        self.most = (
-            MOST_PULSES if most is None else most
-        )  # pulses allowed, and not shorter than they can be
-        if self.shortest > 0.0:
-            self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
+        # Turn by a full pulse, N m s.
+        self.strongest = self.turns_by(STEP * self.h if self.ideal else self.on_time)
 
     def turns_by(self, size: float) -> float:
         """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
-        return (
-            size
-            if self.ideal
-            else self.torque * size * precession.arc_efficiency(self.at_leg.spin, size)
-        )
+        if self.ideal:
+            return size
+        return self.torque * size * precession.arc_efficiency(self.at_leg.spin, size)
 
     def size(self, count: int, bent: float = 1.0) -> float:
         """Size of ``count`` pulses with ``bent`` times those to spare, on ticks; not a number where
         it is too far.
+
+        A pulse moved by an angle of the spin turns its kick by ν/ω3 times that, and loses half of
+        its square.
         """
-        share = self.needed / (count - min(bent * self._spare(count), 0.5 * count))
+        ratio = max(abs(self.at_leg.nutation_rate / self.at_leg.spin), LEAST_RATIO)
+        spare = SPARE + (float(self.left[count - 1]) / ratio) ** 2 / min(count, LAST)
+        share = self.needed / (count - min(bent * spare, 0.5 * count))
         if self.ideal:
             return share
-        width = max(
-            float(precession.on_times_to_turn(np.array([share]), self.torque, self.at_leg.spin)[0]),
-            self.shortest,
+        width = float(
+            precession.on_times_to_turn(np.array([share]), self.torque, self.at_leg.spin)[0]
         )
         return self.windows.tick_after(width) if math.isfinite(width) else math.nan
 
-    def _spare(self, count: int) -> float:
-        """Spare pulses of a train of ``count`` that is corrected.
-
-        A pulse moved by an angle of the spin turns its kick by ``a`` times that, and loses half of
-        its square.
+    def attempts(self) -> list[Attempt]:
+        """Trains to fly, of the length requested or of any, the most promising first; raises
+        Infeasible where there is none.
         """
-        ratio = abs(self.at_leg.nutation_rate / self.at_leg.spin)
-        return SPARE + (float(self.left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(
-            count, LAST
-        )
-
-    def free(self) -> list[Attempt]:
-        """Trains of any length to fly, the most promising first; raises Infeasible where there is
-        none.
-        """
-        left = self.left
-        fewest = self._fewest(self.strongest)
-        if fewest > len(left):
-            fewest = self._fewest(self.turns_by(STEP * self.h if self.ideal else self.widest))
-        most = min(len(left), self.most)
-        if fewest > most:
-            raise self._too_few(fewest)
-        closing = [count for count in range(fewest, most + 1) if left[count - 1] <= CLOSED]
-        if not closing:
-            best = int(np.argmin(left[fewest - 1 : most])) + fewest
-            if left[best - 1] > OPEN:
-                raise self._in_phase(fewest, most)
-            closing = [best]
-        # Of the next few counts the one that closes best, or that ticks make least dear; at last
-        # with room to bend.
-        near = [count for count in closing if count <= 1.25 * closing[0] + 3]
-        free = self.at_leg.limits.tick is None
-        tried = [Attempt(count, self.size(count), True, free) for count in near]
-        tried.sort(
-            key=lambda attempt: (
-                float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size
+        left, limits, requested = self.left, self.at_leg.limits, self.options.on_time
+        most = min(len(left), limits.max_pulses or MOST_PULSES)
+        least = 0.0 if requested is not None else self.shortest
+        # Wide pulses only where the horizon leaves no time for so many of the usual ones.
+        usual = STEP * self.h if self.ideal else self.on_time
+        widest = usual if self.ideal or requested is not None else max(usual, self.widest)
+        counts = list[int]()
+        for longest in (usual, widest):
+            sizes = {count: self.size(count) for count in range(2, most + 1)}
+            counts = counts or [
+                count
+                for count, size in sizes.items()
+                if least - TOUCHING <= size <= longest + TOUCHING
+            ]
+        if not counts:
+            needed = max(math.ceil(self.needed / self.turns_by(widest)), 2)
+            if needed > (limits.max_pulses or needed):
+                raise Infeasible(
+                    f"a train to the target takes at least {needed} pulses, "
+                    f"and limits.max_pulses leaves {limits.max_pulses} for it"
+                )
+            turns = needed / self.options.per_turn * self.turn
+            text = f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the "
+            short = f"limits leave time for {most}"
+            raise TooShort(text + (short if needed > most else "shortest pulses turn H beyond it"))
+        phases = {count: float(left[count - 1]) for count in counts}
+        best = min(counts, key=lambda count: phases[count])
+        if phases[best] > OPEN:
+            ratio = self.at_leg.axial / (self.at_leg.inertia.A * self.at_leg.spin)
+            off = math.degrees(self.way * min(phases[count] / count for count in counts))
+            raise TooShort(
+                f"no train of {counts[0]} to {counts[-1]} pulses ends without nutation: at least "
+                f"{off:.3g}° would be left. The pulses meet the nutation in one phase, and build "
+                "it up, where C/(A × pulses per turn) is near a whole number, and it is "
+                f"{ratio / self.options.per_turn:.4g}; try another --per-turn, half-cone or "
+                "two-pulse"
             )
-        )
-        del tried[TRIES:]
-        tried += [Attempt(count, self.size(count, BENT), False, free) for count, *_ in tried[:2]]
-        widest = math.inf if self.ideal else max(self.on_time, self.widest) + TOUCHING
-        possible = list(
-            {attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values()
-        )[::-1]
-        if not possible:
-            raise self._too_few(most + 1)
-        return possible
-
-    def held(self) -> list[Attempt]:
-        """Trains of the length requested, the fewest pulses first; raises Infeasible where there is
-        none.
-        """
-        left = self.left
-        fewest = self._fewest(self.strongest)
-        most = min(self.most, len(left))
-        if fewest > most:
-            raise self._too_few(fewest)
-        counts = range(fewest, min(most, fewest + 2 * TRIES) + 1)
-        closing = [count for count in counts if left[count - 1] <= OPEN]
-        enough = [
-            count
-            for count in closing
-            if count - self.needed / self.strongest >= 0.5 * self._spare(count)
-        ]
-        tried = [
-            Attempt(count, self.on_time, bool(left[count - 1] <= CLOSED))
-            for count in enough or closing
-        ]
-        if not tried:
-            raise self._in_phase(fewest, counts[-1])
-        return tried[: 2 * TRIES]
-
-    def _fewest(self, each: float) -> int:
-        """Least number of pulses that turn H by up to ``each`` N m s; two at least, to close."""
-        return max(math.ceil(_ratio(self.needed, each) - 1e-9), 2)
+        # Of the next few counts the one that closes best, or that costs least; at last with room to
+        # bend.
+        closed = OPEN if requested is not None else CLOSED
+        closing = [count for count in counts if phases[count] <= closed] or [best]
+        near = [count for count in closing if count <= 1.25 * closing[0] + 3]
+        tried = {(count, requested or self.size(count)): phases[count] <= CLOSED for count in near}
+        free = requested is None and limits.tick is None
+        ranked = sorted(tried, key=lambda each: phases[each[0]] if free else each[0] * each[1])
+        del ranked[TRIES:]
+        bent = [(count, self.size(count, BENT)) for count, _ in ranked[:2]]
+        ranked += [each for each in bent if requested is None and each[1] <= widest + TOUCHING]
+        return [Attempt(*each, tried.get(each, False)) for each in dict.fromkeys(ranked)]
 
     @cached_property
     def left(self) -> Vector:
@@ -270,29 +205,31 @@ class Train:
         # Moments (s) of right phase within the limits, undisturbed, and the direction in the body
         # of each push.
         shots: list[tuple[float, complex]] = []
-        ready = self.at_leg.limits.earliest
+        per_turn, limits = self.options.per_turn, self.at_leg.limits
+        ready = limits.earliest
         on_time = 0.0 if self.ideal else self.on_time
         firsts = [
             (_aligned(self.at_leg, channel, self.ahead, ready), channel.transverse)
             for channel in self.channels
         ]
-        gap = max(self.at_leg.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
+        if not firsts:  # a torquer has the phases of the spin turn from its first pulse on
+            times = [
+                ready + 0.5 * on_time + number * self.turn / per_turn for number in range(per_turn)
+            ]
+            firsts = [(time, _in_body(self.at_leg, self.ahead, time)) for time in times]
+        gap = max(limits.gap, 0.5 * self.turn / per_turn - on_time)
 
         def after(first: float, time: float) -> float:
             """Moment of the phase of ``first`` from ``time`` s on."""
             return first + max(math.ceil((time - first) / self.turn - 1e-9), 0) * self.turn
 
-        for _ in range(MOST_PULSES + len(self.at_leg.limits.blackout)):
+        for _ in range(MOST_PULSES + len(limits.blackout)):
             start = self.windows.earliest_start(on_time, ready)
             if start is None or len(shots) == MOST_PULSES:
                 break
             centre = start + 0.5 * on_time
-            if firsts:
-                first, push = min(firsts, key=lambda shot: after(shot[0], centre))
-                t = after(first, centre)
-            else:
-                t = centre
-                push = _in_body(self.at_leg, self.ahead, centre)
+            first, push = min(firsts, key=lambda shot: after(shot[0], centre))
+            t = after(first, centre)
             if t + 0.5 * on_time > self.windows.horizon:
                 break
             free = self.windows.blocked_until(t - 0.5 * on_time, on_time)
@@ -301,8 +238,6 @@ class Train:
                 continue
             shots.append((t, push))
             ready = t + 0.5 * on_time + gap
-            if not firsts:
-                ready = max(t + self.turn / self.options.per_turn - 0.5 * on_time, ready)
         turned = self.at_leg.nutation_rate * np.array([t for t, _ in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(np.array([push for _, push in shots])) + turned)))
         counts = np.arange(1, len(shots) + 1)
@@ -348,45 +283,30 @@ class Train:
         angle = cmath.phase(_in_body(at_leg, ahead, centre))
         return steerable_pulse(at_leg.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
 
-    def _in_phase(self, fewest: int, most: int) -> Infeasible:
-        """Error where trains of ``fewest`` to ``most`` pulses leave nutation."""
-        ratio = self.at_leg.axial / (
-            self.at_leg.inertia.A * self.at_leg.spin * self.options.per_turn
-        )
-        least = math.degrees(float(self.left[fewest - 1 : most].min()) * self.way / most)
-        if abs(ratio - round(ratio)) * most >= 1.0:
-            return Infeasible(
-                f"no train of {fewest} to {most} pulses, as limits and on-times allow, ends "
-                f"without nutation: at least {least:.3g}° would be left; try a longer horizon "
-                "or another --per-turn"
-            )
-        return Infeasible(
-            f"C/(A × pulses per turn) = {ratio:.4g} is near a whole number, so the pulses "
-            "meet the nutation in nearly the same phase and build it up. The best train of "
-            f"{fewest} to {most} pulses would leave {least:.3g}°; try another --per-turn, a "
-            "longer horizon, half-cone or two-pulse"
-        )
 
-    def _too_few(self, needed: int) -> Infeasible:
-        """Message on limits that leave too few times or pulses."""
-        most = self.at_leg.limits.max_pulses
-        moments = len(self.left)
-        if most is not None and most < needed:
-            return Infeasible(
-                f"a train to the target takes at least {needed} pulses, and limits.max_pulses "
-                f"leaves {most} for it"
+def _different(at_leg: Spacecraft, count: int) -> list[Channel]:
+    """So many channels, of directions as different as can be, the one that costs least for its
+    torque first.
+    """
+    channels = usable(at_leg)
+    if not channels:
+        raise Infeasible("no time is left for the turn after the nutation is damped")
+    different = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
+    while len(different) < count:
+        off = [
+            min(
+                abs(cmath.phase(each.transverse * other.transverse.conjugate()))
+                for other in different
             )
-        if needed <= moments:
-            return Infeasible(
-                "this many of the shortest pulses turn H beyond the target; lower min_on_time, "
-                "or use two-pulse"
+            for each in channels
+        ]
+        if max(off) < 0.2:
+            raise Infeasible(
+                f"{count} pulses a spin turn need {count} channels of different directions, "
+                f"because each passes the phase once a turn; there are {len(different)}"
             )
-        turns = needed / self.options.per_turn * self.turn
-        return TooShort(
-            f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the "
-            f"limits leave time for {moments}; allow longer pulses, more pulses a turn, or "
-            "a longer horizon"
-        )
+        different.append(channels[off.index(max(off))])
+    return different
 
 
 def _aligned(at_leg: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
@@ -413,14 +333,9 @@ def _in_body(at_leg: Spacecraft, direction: Vector, t: float) -> complex:
     """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s,
     undisturbed.
     """
-    _, quaternions = Arc.of(at_leg.inertia, at_leg.initial).motion(np.array([t]))
+    _, quaternions = free_coast(at_leg.inertia, at_leg.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
-
-
-def _ratio(whole: float, part: float) -> float:
-    """Ratio of ``whole`` to ``part``; a billion at most, also where the part is nothing."""
-    return whole / part if whole < 1e9 * part else 1e9
 
 
 # rad of flown residual that count as nothing, and relative saving that is worth more pulses.
@@ -437,72 +352,46 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     except Infeasible as why:
         if options.on_time is None:
             raise
-        raise Infeasible(f"{why}; {_another(spacecraft, options)}") from None
+        other: Schedule | None = None
+        with suppress(Infeasible):
+            other = _train(spacecraft, replace(options, on_time=None))
+        if other is None or not other.pulses:
+            raise
+        works = f"{len(other)} pulses, the last {other.pulses[-1].on_time:.4g} s long"
+        raise Infeasible(f"{why}; without --on-time there is a train of {works}") from None
 
 
 def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     """Train from t = 0, or else after damping of the nutation.
     Raises Infeasible with the reason.
     """
-    builder = FlownBuilder(spacecraft)
+    legs = Legs(spacecraft)
     reason = Infeasible("")
-    train = Train(builder.at_leg, options)
+    train = Train(legs.at_leg, options)
     if spacecraft.least_impulse <= 0.5 * train.strongest and train.way > ROUNDING:
         try:
-            return _best(builder, train)
+            return _best(legs, train)
         except Infeasible as why:
             reason = why
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
-    builder = one_pulse.damped(builder)
-    if builder.left <= ROUNDING:
-        return builder.schedule(note("no-train"))
-    return _best(builder, Train(builder.at_leg, options))
+    legs = damped(legs)
+    if legs.left <= ROUNDING:
+        return legs.schedule(note("no-train"))
+    return _best(legs, Train(legs.at_leg, options))
 
 
-def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
-    """Advice on a pulse length that works instead of the requested one, the nearest first."""
-    builder = FlownBuilder(spacecraft)
-    given = options.on_time or 0.0
-    ticks = spacecraft.limits.tick is not None
-    with suppress(Infeasible):
-        if spacecraft.least_impulse > 1e-9 * abs(spacecraft.axial):
-            builder = one_pulse.damped(builder)
-        train = Train(builder.at_leg, replace(options, on_time=None))
-        counts = range(2, min(len(train.left), train.most) + 1)
-        lengths = {train.size(count) for count in counts if train.left[count - 1] <= OPEN}
-        if ticks:
-            lengths |= {train.windows.nearest_tick(given), train.windows.tick_after(given)}
-        possible = [
-            length
-            for length in lengths
-            if train.shortest <= length <= train.widest and length > 0.0
-        ]
-        for length in sorted(possible, key=lambda length: abs(length - given))[:OTHERS]:
-            digits = 3 - math.floor(math.log10(length))
-            rounded = (
-                math.ceil(length * 10.0**digits) / 10.0**digits
-            )  # up: so that no more pulses are needed
-            with suppress(Infeasible):
-                whole = _train(spacecraft, replace(options, on_time=rounded))
-                if correction.left(spacecraft, whole) <= max(
-                    10.0 * EXACT, ticks * tolerable(spacecraft)
-                ):
-                    return f"--on-time {rounded:.4g}s works, with {len(whole)} pulses in all"
-    return "no other length was found that works"
-
-
-def _best(builder: FlownBuilder, train: Train) -> Schedule:
+def _best(legs: Legs, train: Train) -> Schedule:
     """Train that leaves least, of those that leave nothing the first, unless a later one costs
     clearly less.
     """
     best = math.inf, math.inf, Schedule()
-    before = sum(pulse.magnitude for pulse in builder.pulses)
+    before = sum(pulse.magnitude for pulse in legs.pulses)
     requested = train.options.on_time
     floor = train.needed / precession.arc_efficiency(
         train.at_leg.spin, train.shortest if requested is None else requested
     )
-    for attempt in train.free() if requested is None else train.held():
+    for attempt in train.attempts():
         # What the rounding of the start of one pulse to a tick leaves counts as nothing.
         rounding = (
             train.turns_by(attempt.size)
@@ -513,7 +402,7 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
         nothing = max(EXACT, rounding)
         if best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
-        schedule, left = _flown(builder.fork(), train, attempt)
+        schedule, left = _flown(legs.fork(), train, attempt)
         left = max(left, nothing)
         cost = schedule.total_impulse - before
         if left < 0.5 * best[0] or (left <= best[0] and cost < (1.0 - CLEARLY) * best[1]):
@@ -529,28 +418,28 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     return best[2]
 
 
-def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
+def _flown(legs: Legs, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
     """Train, each pulse aimed from the current H, the last ones moved; and its residual, rad."""
     count = attempt.pulses
+    # The size of a command is not corrected, nor that of a long train, which has little to spare.
+    free = train.options.on_time is None and train.at_leg.limits.tick is None
+    resized = count if free and count <= SHORT else 0
     for remaining in range(count, 0, -1):
-        pulse = train.next_pulse(builder.at_leg, remaining, attempt)
+        pulse = train.next_pulse(legs.at_leg, remaining, attempt)
         if pulse is None or work.exhausted():
             break
-        builder.fire((pulse,))
-    fired = min(count, len(builder.pulses))
+        legs.fire((pulse,))
+    fired = min(count, len(legs.pulses))
     for last in MOVED:
-        before = builder.left
+        before = legs.left
         if before < EXACT or work.exhausted():
             break
-        # A train of more than 60 pulses has little to spare: its size is not corrected.
-        builder.correct(
-            min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0
-        )
-        if train.at_leg.limits.tick is not None and builder.left > 0.5 * before:
+        legs.correct(min(last, fired), resized=resized)
+        if train.at_leg.limits.tick is not None and legs.left > 0.5 * before:
             break  # what is left is the rounding of starts
-    if not builder.pulses:
-        return builder.schedule(), builder.left
-    on_time = builder.pulses[-1].on_time
+    if not legs.pulses:
+        return legs.schedule(), legs.left
+    on_time = legs.pulses[-1].on_time
     description = note(
         "great-circle-train" if train.at_leg.goal.sun is None else "rhumb-line-train",
         count=count,
@@ -558,6 +447,6 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
         on_time_s=on_time,
         way_deg=math.degrees(train.way),
         efficiency=float(precession.arc_efficiency(train.at_leg.spin, on_time)),
-        damping=max(len(builder.pulses) - count, 0),
+        damping=max(len(legs.pulses) - count, 0),
     )
-    return builder.schedule(description), builder.left
+    return legs.schedule(description), legs.left

@@ -19,7 +19,7 @@ from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude
 from nutdamp.schemes import catalogue, planner, valve_commands
-from nutdamp.schemes.valve_commands import Legs
+from nutdamp.schemes.legs import Legs
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,11 +12,11 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.common.results import note
-from nutdamp.errors import Infeasible, TooShort, listed
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import driven, energy_sink, response
-from nutdamp.schemes.correction import ALIGNED, FADED
-from nutdamp.spacecraft.constraints import Windows, longest_useful, usable
+from nutdamp.physics import response
+from nutdamp.schemes.correction import ALIGNED, components
+from nutdamp.spacecraft.constraints import Windows, at_hand, bounded_by, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.roles import with_limits
@@ -104,6 +103,8 @@ class ImpulseBuilder:
         angle = self.turning * since
         slower = self.wheel / self.C
         if growth != 0.0:
+            from nutdamp.physics import energy_sink  # dissipation
+
             motion = omega, spin, since, self.wheel, self.spacecraft.sense
             effect = energy_sink.coast(self.A, self.C, growth, *motion)
             equivalent = math.hypot(spin + slower, self.A / self.C * abs(omega))  # |H|/C
@@ -127,6 +128,8 @@ class ImpulseBuilder:
         free, _ = self._coast(time)
         if not self.spacecraft.disturbances:
             return free
+        from nutdamp.physics import driven  # disturbances
+
         forced = 0.0 + 0.0j
         for disturbance in self.spacecraft.disturbances:
             begin, lasts = disturbance.within(self.now, time)
@@ -204,6 +207,8 @@ class ImpulseBuilder:
             since = ready + 0.5 * on_time - slack - self.now
             turned = since
             if not self._even:
+                from nutdamp.physics import energy_sink  # dissipation
+
                 growth, cosine, square = self._sink()
                 turned = energy_sink.course(growth, cosine, square, since).travel / cosine
             return math.ceil((turned - first) / self.period)
@@ -211,9 +216,11 @@ class ImpulseBuilder:
         turns = alignment(self.ready)
         for _ in range(len(windows.limits.blackout) + MISSED):
             turned = first + turns * self.period
-            centre = self.now + (
-                turned if self._even else energy_sink.time_to_turn(*self._sink(), turned)
-            )
+            if not self._even:
+                from nutdamp.physics import energy_sink  # dissipation
+
+                turned = energy_sink.time_to_turn(*self._sink(), turned)
+            centre = self.now + turned
             if math.isinf(centre):  # dissipation stops the spin before
                 return None
             if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:
@@ -296,45 +303,6 @@ def fire_components(
             builder.fire(pulse)
 
 
-def components(channels: list[Channel], target: complex) -> list[tuple[Channel, float]]:
-    """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else
-    the nearest.
-    """
-    best: list[tuple[Channel, float]] = []
-    least = math.inf
-    for left, right in itertools.combinations(channels, 2):
-        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (left, right))
-        area = (d1.conjugate() * d2).imag
-        if abs(area) < 1e-9:
-            continue
-        first, second = (target.conjugate() * d2).imag / area, (d1.conjugate() * target).imag / area
-        if min(first, second) >= -1e-12 * abs(target) and first + second < least:
-            least = first + second
-            best = [(left, first), (right, second)]
-    if not best:
-        along = [
-            (target * channel.transverse.conjugate()).real / abs(channel.transverse)
-            for channel in channels
-        ]
-        best = [max(zip(channels, along, strict=True), key=lambda share: share[1])]
-    return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]
-
-
-def bounded_by(spacecraft: Spacecraft) -> str:
-    """Limits on a schedule of its channels, by name: the horizon, and those that the file sets."""
-    limits, channels = spacecraft.limits, spacecraft.channels
-    there = {
-        f"the horizon of {spacecraft.horizon:.4g} s": True,
-        "on-times": any(
-            channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels
-        ),
-        "gap": limits.gap > 0.0,
-        "ticks": limits.tick is not None,
-        "blackout windows": bool(limits.blackout),
-    }
-    return listed([name for name in there if there[name]])
-
-
 # Multiple of the horizon up to which a sufficient one is sought, where the default one is not
 # longer; halvings of the last doubling: the one that is named is at most an eighth of it too long.
 LATEST, BISECTIONS = 64.0, 3
@@ -399,26 +367,6 @@ def longer_horizon(
 NO_AXIAL = "no channel has a torque about axis 3, so no channel can set the spin; leave out --spin"
 
 
-def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
-    """Damping ``channels``; raises Infeasible where there are none."""
-    if channels:
-        return channels
-    if not spacecraft.channels:
-        raise Infeasible("the file has no thrusters, and this scheme needs body-fixed thrusters")
-    if not any(channel.damps for channel in spacecraft.channels):
-        raise Infeasible("no channel can damp nutation: each has more axial than transverse torque")
-    ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
-    time = spacecraft.horizon - spacecraft.limits.earliest
-    if time <= 0.0:  # by the file, or where other pulses of the scheme come first
-        raise Infeasible(
-            "no time is left before limits.horizon, after limits.earliest or the pulses before"
-        )
-    raise Infeasible(
-        f"no channel can be on for its min_on_time{ticks}, at most its max_on_time, "
-        f"within the {time:.4g} s from limits.earliest to limits.horizon"
-    )
-
-
 def expect_aim(spacecraft: Spacecraft) -> None:
     """Raise Infeasible without a target to which a scheme could turn the spin axis, or without an
     actuator.
@@ -430,9 +378,9 @@ def expect_aim(spacecraft: Spacecraft) -> None:
 
 
 def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
-    """Error where no channel can be fired against ω within the limits, with the cure."""
-    omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    """Error where no channel can be fired against ω within the limits."""
     if spacecraft.nutation_rate == 0.0:
+        omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         off = {
             channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate()))
             for channel in channels
@@ -442,46 +390,34 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
             "no channel opposes the nutation, and waiting does not help: ω does not turn "
             f"in this body. Nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off"
         )
-    builder = ImpulseBuilder(spacecraft, endless=True)
-    pulses, ends = [], []
-    for channel in channels:
-        shortest = builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period))
-        if shortest is None:
-            continue
-        pulses.append(shortest)
-        if builder.helps(shortest):
-            most = longest_useful(channel.max_on_time, builder.period)
-            needed = builder.on_time_for(channel, builder.left)
-            pulse = builder.align(channel, most if needed is None else min(needed, most))
-            ends.append(shortest.end if pulse is None else max(pulse.end, shortest.end))
-    if not pulses:
-        if spacecraft.growth <= 0.0:
-            return Infeasible("no channel ever opposes the nutation")
-        return Infeasible(
-            "no channel opposes the nutation before dissipation brings the body into flat "
-            "spin, where ω does not turn in the body"
-        )
-    if not ends:
-        best = min(pulses, key=builder.left_after)
-        left = builder.A * abs(builder.omega_at(best.t))
-        if left < FADED * builder.left:
-            return Infeasible(
-                "dissipation damps the nutation before the first channel opposes it, at "
-                f"{best.t:.4g} s"
-            )
-        return Infeasible(
-            "the shortest pulse of each channel is too strong: the nutation is "
-            f"{turn_of(spacecraft, left)}, and a pulse would leave "
-            f"{turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
-        )
-    if min(ends) <= spacecraft.horizon:
-        return Infeasible(
-            "channels oppose the nutation within the horizon, but the planned pulses increase it"
-        )
+    names = ", ".join(channel.name for channel in channels)
     return TooShort(
-        f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
-        f"the first such pulse would end at {min(ends):.6g} s: set limits.horizon later",
+        f"no pulse of the channels ({names}) opposes the nutation and lowers it within "
+        f"{bounded_by(spacecraft)}"
     )
+
+
+def reach(spacecraft: Spacecraft) -> float:
+    """Most by which one pulse turns H, N m s."""
+    from nutdamp.physics import precession  # turns
+
+    torquer, spin = spacecraft.torquer, spacecraft.spin
+    if torquer is not None:
+        torque = math.inf if torquer.torque is None else torquer.torque
+        return precession.reach(torque, spin, math.inf)
+    return max(
+        (
+            precession.reach(abs(channel.transverse), spin, channel.max_on_time)
+            for channel in usable(spacecraft)
+        ),
+        default=0.0,
+    )
+
+
+def strongest_turn(spacecraft: Spacecraft) -> str:
+    """Sentence on the turn of H by one pulse, for reasons of infeasibility."""
+    most, way = turn_of(spacecraft, reach(spacecraft)), math.degrees(spacecraft.to_turn)
+    return f"the target is {way:.4g} deg from H, which one pulse turns by {most} at most"
 
 
 def turn_of(spacecraft: Spacecraft, impulse: float) -> str:

@@ -10,20 +10,14 @@ shape of the thrust are corrected on the flown motion.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from nutdamp.common import work
-from nutdamp.common.results import Note, note
-from nutdamp.errors import Infeasible, TooShort
-from nutdamp.flight import propagation
+from nutdamp.common.results import note
+from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Supply, lightened, shed, supplied
-from nutdamp.physics import attitude
 from nutdamp.schemes import correction
-from nutdamp.schemes.block_model import fired, sun_pulses
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.correction import TAIL, Correction
 from nutdamp.spacecraft.constraints import (
@@ -33,15 +27,13 @@ from nutdamp.spacecraft.constraints import (
     keeps_limits,
     shortest_on_time,
 )
-from nutdamp.spacecraft.equipment import Block, Channel
-from nutdamp.spacecraft.model import Attitude, Inertia, Limits, Spacecraft, disturbing_after
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.roles import with_limits
 from nutdamp.spacecraft.schedule import (
-    STEERABLE,
     Pulse,
     Schedule,
     channel_pulse,
-    steerable_pulse,
 )
 
 ROUNDING = 1e-12  # share by which an on-time may pass its bounds
@@ -133,50 +125,41 @@ def planned(
 ) -> Schedule:
     """Schedule that ``plan`` gives for the body without valves, as commands for the true one; see
     `as_commands`.
+
+    A fixed point in a few rounds: each plans with what the commands of the one before need.
     """
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
-    schedule: Schedule | None = None
     for _ in range(PLANS):
-        without = without_valves(spacecraft, weakest, strongest, room, 0.5 * used)
+        without = without_valves(spacecraft, weakest, strongest, room, used)
         try:
             schedule = plan(without)
         except Infeasible as reason:
-            if schedule is not None:
+            if tried:
                 break
-            if isinstance(reason, TooShort):
-                raise TooShort(reason.why + EFFECTIVE, reason.cure) from None
             raise type(reason)(f"{reason}{EFFECTIVE}") from None
-        too_weak, too_strong, longer = _outside(spacecraft, schedule, without.inertia, correct)
-        if too_weak or too_strong:
-            weakest = min([weakest, *too_weak])
-            strongest = max([strongest, *too_strong])
-            continue
-        if used == 0.0 and shed(spacecraft) is not None and schedule.propellant:
-            used = schedule.propellant  # once more with the moments half-way
-            continue
         try:
+            levels, longer = _demands(spacecraft, schedule, without.inertia, correct)
             commands = as_commands(spacecraft, schedule, correct, without.inertia)
         except Infeasible:
-            if not tried:
-                raise
-            break
-        kept = keeps_limits(spacecraft, commands.pulses)
+            if tried:
+                break
+            raise
+        broken = not keeps_limits(spacecraft, commands.pulses)
         left = _left(spacecraft, commands, correct)
-        tried.append((not kept, left, commands))
-        if work.exhausted() or not schedule.pulses:
+        tried.append((broken, left, commands))
+        halfway = used if shed(spacecraft) is None else 0.5 * (schedule.propellant or 0.0)
+        fed = not levels and (used > 0.0 or halfway == 0.0)  # as strong, and with moments half-way
+        near = spacecraft.limits.tick is not None or (
+            left <= NEARLY * _left(without, schedule, correct) + EXACT
+        )
+        if work.exhausted() or not schedule.pulses or (fed and near and not broken):
             break
-        if kept and (
-            spacecraft.limits.tick is not None
-            or left <= NEARLY * _left(without, schedule, correct) + EXACT
-        ):
-            break
-        # What is longer than planned, or has been moved, met its neighbour or a window: the next
-        # one leaves room.
-        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
-    assert schedule is not None
-    if not tried:
-        return as_commands(spacecraft, schedule, correct, without.inertia)
+        if fed:
+            # What is longer than planned, or has been moved, met its neighbour or a window.
+            room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
+        weakest, strongest = min([weakest, *levels]), max([strongest, *levels])
+        used = used or halfway
     return min(tried, key=lambda trial: trial[:2])[2]
 
 
@@ -211,22 +194,18 @@ def as_commands(
                 supply.count((pulse,))
         if supply.shortage is not None:
             raise Infeasible(supply.shortage)
-    fired = [
-        pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0
-    ]
+    fired = [pulse for pulse, each in zip(schedule, commands, strict=True) if each.magnitude > 0.0]
     notes = list(firing.notes)
     tank = spacecraft.tank
-    if correct.options.equal and fired:
-        pairs = [
-            pair
-            for pair in zip(fired, corrected, strict=True)
-            if pair[0].on_time == fired[-1].on_time
-        ]
-        alike = [command.loaded[1] for _, command in pairs if command.magnitude > 0.0]
-        shortest = min(alike, default=0.0)
-        longest = max(alike, default=0.0)
-        if f"{shortest:.4g}" != f"{longest:.4g}":
-            notes.append(note("unequal-commands", shortest_s=shortest, longest_s=longest))
+    lengths = [
+        (pulse.on_time, command.loaded[1])
+        for pulse, command in zip(fired, corrected, strict=True)
+        if command.magnitude > 0.0
+    ]
+    if correct.options.equal and lengths:
+        alike = [length for on_time, length in lengths if on_time == lengths[-1][0]]
+        if f"{min(alike):.4g}" != f"{max(alike):.4g}":
+            notes.append(note("unequal-commands", shortest_s=min(alike), longest_s=max(alike)))
     if tank is not None and firing.pulses:
         full, left = 1e-5 * tank.pressure, 1e-5 * tank.pressure_after(firing.propellant or 0.0)
         if f"{full:.4g}" != f"{left:.4g}":
@@ -298,187 +277,39 @@ def _translated(
     return tuple(pulses)
 
 
-def _outside(
+def _demands(
     spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia, correct: Correction
-) -> tuple[list[float], list[float], float]:
-    """Levels of pulses too weak, and too strong, for any command; s by which one becomes longer at
+) -> tuple[list[float], float]:
+    """Levels of pulses too weak or too strong for any command; s by which one becomes longer at
     each end.
     """
     channels = {channel.name: channel for channel in spacecraft.channels}
-    weak = []
-    strong = []
+    levels = list[float]()
     longer = 0.0
     translated = _translated(spacecraft, schedule, inertia, correct, unbounded=True)
     for planned_, pulse in zip(schedule, translated, strict=True):
         longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
         channel = channels.get(pulse.channel)
-        if channel is None or pulse.torque is None:
+        if channel is None:
             continue
         least, most = effective_on_times(channel)
-        level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
-        level = level if shed(spacecraft) is None else planned_.on_time / pulse.on_time
-        if pulse.on_time > most * (1.0 + ROUNDING):
-            weak.append(level)
-        if pulse.on_time < least * (1.0 - ROUNDING):
-            strong.append(level)
-    return weak, strong, longer
+        if not least * (1.0 - ROUNDING) <= pulse.on_time <= most * (1.0 + ROUNDING):
+            levels.append(planned_.on_time / pulse.on_time)
+    return levels, longer
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
-    """Schedule on the ticks of its commands: the better of rounding all at once, and the last
-    pulses in turn.
+    """Schedule on the ticks of its commands: its last pulses are rounded in turn, and those behind
+    corrected.
     """
     smooth = with_limits(spacecraft, tick=None)
     made = correct(smooth, made, TAIL)
-
-    def rounded(schedule: Schedule, count: int) -> Schedule:
-        """Copy with the first ``count`` pulses on ticks."""
+    for behind in range(min(TAIL, len(made)) - 1, -1, -1):
         pulses = (
-            commandable(spacecraft, pulse) if index < count else pulse
-            for index, pulse in enumerate(schedule)
+            commandable(spacecraft, pulse) if index < len(made) - behind else pulse
+            for index, pulse in enumerate(made)
         )
-        return replace(schedule, pulses=supplied(spacecraft, pulses))
-
-    in_turn = made
-    for behind in range(min(TAIL, len(made)) - 1, 0, -1):
-        in_turn = correct(smooth, rounded(in_turn, len(made) - behind), behind)
-    roundings = [rounded(schedule, len(made)) for schedule in (made, in_turn)]
-    kept = [
-        schedule for schedule in roundings if keeps_limits(spacecraft, schedule.pulses)
-    ] or roundings
-    return min(kept, key=lambda schedule: _left(spacecraft, schedule, correct))
-
-
-class FlownBuilder:
-    """Pulses chosen so far, and the spacecraft after them.
-
-    ``at_leg`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began
-    there, with the goal of the whole. ``steps``: of integration that the flight took so far.
-    """
-
-    def __init__(self, spacecraft: Spacecraft) -> None:
-        self.at_leg = replace(
-            spacecraft,
-            goal=replace(spacecraft.goal, axis=spacecraft.target_axis),
-            limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
-        )
-        self.now = 0.0
-        self.steps = 0
-        self.pulses: list[Pulse] = []
-        self._before: list[tuple[float, Spacecraft]] = []
-
-    @property
-    def left(self) -> float:
-        """Residual, rad: nutation or distance of H from the target, whichever is larger."""
-        return max(self.at_leg.nutation, self.at_leg.to_turn)
-
-    def fork(self) -> FlownBuilder:
-        """Another builder that goes on from here."""
-        other = FlownBuilder(self.at_leg)
-        other.now, other.pulses, other._before = self.now, list(self.pulses), list(self._before)
-        return other
-
-    def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
-        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are
-        ``bounded`` by work left.
-        """
-        base = self.now
-        for pulse in pulses:
-            if bounded and work.exhausted():
-                raise Infeasible("the flight of the pulses for that was not finished")
-            self._before.append((self.now, self.at_leg))
-            timed = pulse.moved(base)
-            at_leg = self.at_leg
-            pulse_ = timed.moved(-self.now)
-            flown = propagation.flown(at_leg, Schedule((pulse_,)))
-            settled, since, limits = flown.settled, pulse_.over, at_leg.limits
-            to_principal = attitude.from_matrix(at_leg.inertia.axes.T)
-            given = at_leg.attitude or Attitude(settled.quaternion)
-            self.at_leg = replace(
-                at_leg,
-                inertia=lightened(at_leg, pulse_.propellant or 0.0),
-                omega0=settled.rates,
-                attitude=replace(
-                    given,
-                    quaternion=attitude.multiply(settled.quaternion, to_principal),
-                    epoch=None,
-                ),
-                disturbances=disturbing_after(at_leg.disturbances, since),
-                limits=replace(
-                    limits,
-                    horizon=at_leg.horizon - since,
-                    earliest=limits.gap,
-                    max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
-                    blackout=tuple(
-                        (begins - since, ends - since)
-                        for begins, ends in limits.blackout
-                        if ends > since
-                    ),
-                ),
-            )
-            self.steps += flown.steps
-            self.pulses.append(timed)
-            self.now = timed.over
-
-    def correct(self, last: int, *, resized: int = 0) -> None:
-        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized``
-        equal ones, as one.
-        """
-        taken = min(max(last, resized), len(self.pulses))
-        if last == 0 or taken == 0:
-            return
-        self.now, self.at_leg = self._before[-taken]
-        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
-        del self.pulses[-taken:], self._before[-taken:]
-        chosen = range(max(taken - last, 0), taken)
-        self.fire(
-            correction.correct(
-                self.at_leg, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0
-            )
-        )
-
-    def schedule(self, *notes: Note) -> Schedule:
-        """Chosen pulses; ideal ones of a steerable torquer at one moment as their sum."""
-        pulses = list[Pulse]()
-        torquer = self.at_leg.torquer
-        for pulse in self.pulses:
-            ideal = pulse.channel == STEERABLE and pulse.on_time == 0.0
-            if torquer is not None and ideal and pulses and pulses[-1].t == pulse.t:
-                first, second, _ = (pulses.pop().impulse + pulse.impulse).tolist()
-                angle = math.atan2(second, first)
-                size = math.hypot(first, second)
-                pulses.append(steerable_pulse(torquer, pulse.t, angle, impulse=size))
-            else:
-                pulses.append(pulse)
-        return Schedule(tuple(pulses), notes)
-
-
-class Legs:
-    """Schedules for a spacecraft, one after the other: pulses, or the ``blocks`` that fire them."""
-
-    def __init__(self, spacecraft: Spacecraft) -> None:
-        self.spacecraft, self.blocks = spacecraft, list[Block]()
-        self._builder, self._supply = FlownBuilder(spacecraft), Supply(spacecraft)
-
-    @property
-    def at_leg(self) -> Spacecraft:
-        """Spacecraft after the legs so far, its time from there."""
-        return self._supply.behind(self._builder.at_leg)
-
-    def fire(self, schedule: Schedule) -> None:
-        """Take the schedule of one more leg, with times and Sun pulses counted from `at_leg`."""
-        now, builder = self._builder.now, self._builder
-        if schedule.blocks and now > 0.0:
-            passed = len(
-                sun_pulses(propagation.flown(self.spacecraft, builder.schedule(), now), now)
-            )
-            later = tuple(replace(block, first=block.first + passed) for block in schedule.blocks)
-            schedule = replace(schedule, blocks=later)
-        self.blocks += schedule.blocks
-        builder.fire(schedule)
-        self._supply.count(schedule)
-
-    def schedule(self, *notes: Note) -> Schedule:
-        """All of them in one, with the Sun pulses of the whole flight."""
-        whole = fired(self.spacecraft, self.blocks) if self.blocks else self._builder.schedule()
-        return replace(whole, notes=notes)
+        made = replace(made, pulses=supplied(spacecraft, pulses))
+        if behind > 0:
+            made = correct(smooth, made, behind)
+    return made

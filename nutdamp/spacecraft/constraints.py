@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.errors import Infeasible, listed
 from nutdamp.spacecraft.equipment import ANGLE, Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import (
@@ -172,6 +173,41 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
         if (channel.damps or (axial and channel.torque.any()))
         and shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
     ]
+
+
+def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
+    """Damping ``channels``; raises Infeasible where there are none."""
+    if channels:
+        return channels
+    if not spacecraft.channels:
+        raise Infeasible("the file has no thrusters, and this scheme needs body-fixed thrusters")
+    if not any(channel.damps for channel in spacecraft.channels):
+        raise Infeasible("no channel can damp nutation: each has more axial than transverse torque")
+    ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
+    time = spacecraft.horizon - spacecraft.limits.earliest
+    if time <= 0.0:  # by the file, or where other pulses of the scheme come first
+        raise Infeasible(
+            "no time is left before limits.horizon, after limits.earliest or the pulses before"
+        )
+    raise Infeasible(
+        f"no channel can be on for its min_on_time{ticks}, at most its max_on_time, "
+        f"within the {time:.4g} s from limits.earliest to limits.horizon"
+    )
+
+
+def bounded_by(spacecraft: Spacecraft) -> str:
+    """Limits on a schedule of its channels, by name: the horizon, and those that the file sets."""
+    limits, channels = spacecraft.limits, spacecraft.channels
+    there = {
+        f"the horizon of {spacecraft.horizon:.4g} s": True,
+        "on-times": any(
+            channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels
+        ),
+        "gap": limits.gap > 0.0,
+        "ticks": limits.tick is not None,
+        "blackout windows": bool(limits.blackout),
+    }
+    return listed([name for name in there if there[name]])
 
 
 WASTEFUL = 0.5

@@ -24,6 +24,7 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
+from nutdamp.physics import inertia as principal_moments
 from nutdamp.physics.body import ConeAngles
 from nutdamp.spacecraft.equipment import Channel as Channel
 from nutdamp.spacecraft.equipment import Commands as Commands
@@ -128,12 +129,12 @@ class Inertia:
     turns otherwise, constant along axis 3: a momentum wheel or a despun platform.
     """
 
-    moments: rigid_body.Moments
+    moments: principal_moments.Moments
     axes: Vector = field(default_factory=lambda: np.eye(3))
     wheel: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "moments", rigid_body.settled(self.moments))
+        object.__setattr__(self, "moments", principal_moments.settled(self.moments))
 
     @property
     def A(self) -> float:
@@ -319,11 +320,13 @@ class Attitude:
     @property
     def axes(self) -> Vector:
         """(3, 3), whose columns are the axes of the frame in EME2000."""
+        from nutdamp.physics import frames  # frames other than EME2000
+
         if self.epoch is None:
-            return attitude.frame_axes(self.frame)
+            return frames.frame_axes(self.frame)
         from nutdamp.common.time import Epoch  # an epoch
 
-        return attitude.frame_axes(self.frame, Epoch.parse(self.epoch).days_of_j2000)
+        return frames.frame_axes(self.frame, Epoch.parse(self.epoch).days_of_j2000)
 
     def seen_in(self, frame: str | None, epoch: str | None = None) -> Attitude:
         """The same attitude in another frame, of the date of an ``epoch``, which is then the new
@@ -617,66 +620,17 @@ class Spacecraft(results.Data, results.Shown):
         """
         return abs(self.axial) * self.to_turn
 
-    def direction_in_n(self, tilt: float, azimuth: float) -> Vector:
-        """Inertial unit vector (3,) ``tilt`` rad from H at t = 0, ``azimuth`` rad about it from x
-        of the frame N.
-        """
-        in_n = np.array(
-            [math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)]
-        )
-        if self.attitude is None:
-            return in_n
-        body_to_n = replace(self, attitude=None).initial.quaternion
-        in_body = attitude.matrix(body_to_n).T @ in_n
-        return attitude.rotate(self.initial.quaternion, in_body)
-
-    def at_sun_angle(self, angle: float) -> Vector:
-        """Inertial unit vector (3,), ``angle`` rad from the Sun and nearest to H at t = 0. With H
-        along the Sun, or opposite, the one on the north side of the frame.
-        """
-        sun = self.sun
-        assert sun is not None
-        side = np.cross(np.cross(sun, attitude.unit(self.momentum)), sun)
-        if np.linalg.norm(side) < attitude.POLE:
-            side = np.cross(sun, attitude.ascending_node(sun))
-        return np.asarray(math.cos(angle) * sun + math.sin(angle) * attitude.unit(side))
-
     def angles_of(self, direction: Vector) -> tuple[float | None, float]:
         """Angles of an inertial ``direction`` (3,), rad.
 
         Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in
-        [0, 2π) and tilt, as `direction_in_n` takes them. Right ascension and azimuth are None at
-        the pole, where there is none.
+        [0, 2π) and tilt, as `directions.direction_in_n` takes them. Right ascension and azimuth are
+        None at the pole, where there is none.
         """
         about, declination = attitude.sphere_angles(direction)
         return about, math.atan2(
             math.hypot(*direction[:2]), direction[2]
         ) if self.attitude is None else declination
-
-    def seen_in(self, frame: str) -> Spacecraft:
-        """The same spacecraft, with its attitude and all inertial directions given in another
-        frame.
-        """
-        start, orbit, goal = self.attitude, self.orbit, self.goal
-        if start is None or start.frame in (None, frame):
-            return self
-        seen = start.seen_in(frame)
-        rotation = seen.axes.T @ start.axes
-
-        def turned(direction: Vector | None) -> Vector | None:
-            return None if direction is None else rotation @ direction
-
-        return replace(
-            self,
-            attitude=seen,
-            orbit=orbit
-            and replace(
-                orbit, position=rotation @ orbit.position, velocity=rotation @ orbit.velocity
-            ),
-            sun=turned(self.sun),
-            keep=tuple(replace(cone, direction=turned(cone.direction)) for cone in self.keep),
-            goal=replace(goal, axis=turned(goal.axis), sun=turned(goal.sun)),
-        )
 
     def utc(self, time: float, digits: int | None = None) -> str | None:
         """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.

@@ -266,7 +266,7 @@ def idle(spacecraft: Spacecraft, t: Any) -> Any:
 
     sine = math.sin(spacecraft.nutation)
     cosine = math.cos(spacecraft.nutation)
-    effect = energy_sink.courses(spacecraft.growth, cosine, sine * sine, t, spacecraft.damper)
+    effect = energy_sink.course(spacecraft.growth, cosine, sine * sine, t, spacecraft.damper)
     return np.arctan2(sine * effect.transverse, effect.along)
 
 

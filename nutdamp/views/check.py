@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 from rich.console import RenderableType
@@ -28,17 +27,14 @@ from nutdamp.spacecraft.equipment import ANGLE
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import (
     aspects_json,
+    derived_facts,
     derived_table,
     direction_json,
     spacecraft_json,
 )
 from nutdamp.views.dispersion import correlation_json, in_words, size_text, unused_notes
-from nutdamp.views.guide import Topic
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.parts import (
-    named,
-    summary,
-)
+from nutdamp.views.parts import Summary, named
 from nutdamp.views.tables import (
     TEXT,
     Column,
@@ -100,29 +96,23 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
 
 
-def channel_topics(spacecraft: Spacecraft, name: str) -> Iterator[Topic]:
-    """Thrusters, arm, torque, on-times and steps of the channel of that ``name``."""
+def channel_facts(spacecraft: Spacecraft, name: str) -> list[tuple[str, str]]:
+    """Thrusters, arm, torque, on-times and steps of the channel of a ``name``; none without it."""
     table = channel_table(spacecraft)
-    headings = [
-        f"{heading.name}, {heading.unit}".rstrip(", ") for heading in table.headings("screen")
-    ]
-    for channel, cells in zip(spacecraft.channels, table.cells("screen"), strict=True):
+    columns = table.at("screen")[1:]
+    for row in table.rows:
+        channel = row.channel
         if channel.name == name:
             force = 0.0 if channel.force is None else math.hypot(*channel.force)
-            arm = f"{channel.strength / force:.4g} m" if force else "not known"
-            impulses = [
-                f"{channel.strength * time:.4g}"
-                for time in (channel.min_on_time, channel.max_on_time)
-                if math.isfinite(time)
-            ]
-            rows = [
+            times = (channel.min_on_time, channel.max_on_time)
+            impulses = [f"{channel.strength * time:.4g}" for time in times if math.isfinite(time)]
+            return [
                 ("thrusters", ", ".join(thruster.name for thruster in channel.thrusters)),
-                ("arm", arm),
+                ("arm", f"{channel.strength / force:.4g} m" if force else "not known"),
                 ("impulse, N m s", " to ".join([*impulses, "any"][:2])),
-                *zip(headings[1:], cells[1:], strict=True),
+                *((column.headed(", "), column.shown(row)) for column in columns),
             ]
-            text = "\n".join(f"- **{heading}**: {cell}" for heading, cell in rows)
-            yield Topic(name, f"a channel of {named(spacecraft).plain}", text)
+    return []
 
 
 VALVES = (  # columns of pulses of valves that are alike
@@ -306,20 +296,34 @@ def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableT
     counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
     head = [named(spacecraft, "   ", ("VALID", "bold green"), counted)]
     more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
-    tables = [
-        turn_table(spacecraft),
-        valve_table(spacecraft),
-        *map(tank_table, filter(None, [spacecraft.tank])),
-    ]
-    tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]
-    return summary(
+    tables = [table]
+    if verbose:
+        tables += [turn_table(spacecraft), valve_table(spacecraft)]
+        tables += [] if spacecraft.tank is None else [tank_table(spacecraft.tank)]
+        loop = spacecraft.loop
+        tables += [disturbance_table(spacecraft)]
+        tables += [] if loop is None else [margin_table(margins(spacecraft, loop))]
+        tables.append(tolerances)
+    return Summary(
         [*head, derived_table(spacecraft, more)],
-        partial(table.screen, "screen") if table.rows else None,
+        lambda first=None: [each.screen("screen", first=first) for each in tables if each.rows],
         (*warnings(spacecraft), *_notes(spacecraft, verbose=verbose)),
         "nutdamp plan · nutdamp report",
-        more=[each.screen("screen") for each in tables if each.rows],
-        verbose=verbose,
+        verbose,
     )
+
+
+def check_parts(
+    spacecraft: Spacecraft,
+) -> tuple[list[tuple[str, str]], list[DataTable], list[Note]]:
+    """Names and values, tables, and notes of the screen with all values."""
+    facts = [*derived_facts(spacecraft), *_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)]
+    tables = [channel_table(spacecraft), turn_table(spacecraft), valve_table(spacecraft)]
+    tables += [] if spacecraft.tank is None else [tank_table(spacecraft.tank)]
+    held = () if spacecraft.loop is None else margins(spacecraft, spacecraft.loop)
+    tables += [disturbance_table(spacecraft), margin_table(held), tolerance_table(spacecraft)]
+    notes = ordered([*warnings(spacecraft), *_notes(spacecraft, verbose=True)])
+    return facts, [table for table in tables if table.rows], notes
 
 
 def _notes(spacecraft: Spacecraft, *, verbose: bool) -> Iterator[Note]:
@@ -422,10 +426,6 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         together = "; two in the same turns" if commands.per_turn > 1 else ""
         counted = f"at most {commands.max_count} pulses; every: {every} of the turns"
         yield "block", f"{counted}{together}"
-
-
-def _margins(spacecraft: Spacecraft) -> DataTable:
-    return margin_table(() if spacecraft.loop is None else margins(spacecraft, spacecraft.loop))
 
 
 def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
@@ -550,7 +550,11 @@ def checked_json(
             "channels": turn_table(spacecraft).json(),
         },
         "disturbances": disturbance_table(spacecraft).json(),
-        **({} if spacecraft.loop is None else {"loop": _margins(spacecraft).json()}),
+        **(
+            {}
+            if spacecraft.loop is None
+            else {"loop": margin_table(margins(spacecraft, spacecraft.loop)).json()}
+        ),
         "dispersions": spacecraft.dispersions
         and {
             "inputs": [entry._asdict() for entry in inputs],

@@ -138,7 +138,12 @@ def opening(spacecraft: Spacecraft, verbose: bool) -> tuple[RenderableType, ...]
 
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
-    return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
+    return facts([*derived_facts(spacecraft), *more])
+
+
+def derived_facts(spacecraft: Spacecraft) -> list[tuple[str, str]]:
+    """Names and values of the derived quantities of the spacecraft at t = 0."""
+    return [*_derived(spacecraft), *aspect_facts(at_start(spacecraft))]
 
 
 def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:

@@ -20,19 +20,19 @@ from nutdamp.common.results import Note, note
 from nutdamp.files.export import column, cone_columns
 from nutdamp.flight.propagation import IDEAL_IMPULSES, model_name
 from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
-from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
+from nutdamp.montecarlo.statistics import OUTPUTS, Array, cases_to_show
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.planning.causes import main_causes
 from nutdamp.planning.screening import Dispersion
 from nutdamp.planning.verdict import Verdict
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Keep, Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.glance import end_rows
-from nutdamp.views.parts import STEP, named, summary
+from nutdamp.views.parts import STEP, Summary, named
 from nutdamp.views.tables import (
     REAL,
     TEXT,
@@ -103,6 +103,9 @@ EMPTY = (
 )
 """Note on a case whose tank runs empty."""
 
+ACCURACY = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
+"""Note on a study of more cases than are kept."""
+
 
 def dispersion_screen(
     flown: Dispersion, *, worst: int, verbose: bool = True, planned: Sequence[Note] = ()
@@ -114,10 +117,7 @@ def dispersion_screen(
     study = results.study
     ideal = model_name([study.model.schedule]) == IDEAL_IMPULSES
     how = "ideal impulses" if ideal else "full simulation"
-    drawn = f"cases: {results.done:,}, seed {study.seed}"
-    if results.redrawn:
-        drawn += f", unphysical and drawn again: {results.redrawn:,}"
-    title = named(study.model.spacecraft, f": {flown.plan.scheme}, {how}; {drawn}")
+    title = named(study.model.spacecraft, f": {flown.plan.scheme}, {how}; {drawn(results)}")
     head = [title, *verdict_lines(judged, results)]
     if results.emptied:
         share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
@@ -125,37 +125,37 @@ def dispersion_screen(
         head.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
     percentiles = percentile_table(results, FLOWN_OUTPUTS, study.outputs_of({}), alone=True)
     varies = any(entry.sigma for entry in study.model.inputs.drawn)
-    steps = ["--plot cases.png"]
-    if varies:
-        steps.append(f"{again(results)} (worst)")
-    accuracy = []
-    if verbose and not results.exact:
-        right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
-        accuracy.append(Text(right, style="dim"))
-    return summary(
-        head,
-        lambda **_: Group(percentiles.screen("full" if verbose else "screen"), *accuracy),
-        [
-            *(() if verbose else main_causes(judged)),
-            *unused_notes(study.model.inputs.unused),
-            *planned,
-        ],
-        STEP.join(steps),
-        more=_details(flown, worst if varies else 0) if verbose else (),
-        verbose=verbose,
-    )
+    notes = [*unused_notes(study.model.inputs.unused), *planned]
+    if not verbose:
+        steps = STEP.join(["--plot cases.png", *([f"{again(results)} (worst)"] if varies else [])])
+        brief = percentiles.screen("screen")
+        return Summary(head, lambda **_: [brief], [*main_causes(judged), *notes], steps)
+    right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
+    accuracy = [] if results.exact else [Text(right, style="dim")]
+    tables: list[RenderableType] = [
+        Group(percentiles.screen("full"), *accuracy),
+        Group(
+            Text("Nominal case", style="bold"),
+            facts(end_rows(flown.plan._flight, flown.plan._aspects)),
+        ),
+        Group(*tolerance_budget(results)),
+    ]
+    if worst and varies:
+        cases = worst_cases(results, worst, _effects(study))
+        tables.append(inspected(cases, f"nutdamp disperse, as here, with {again(results)}"))
+    return Summary(head, lambda: tables, notes, verbose=True)
 
 
-def _details(flown: Dispersion, worst: int) -> Iterator[RenderableType]:
-    """The nominal case, the tolerance budget and the ``worst`` cases of a study."""
-    results, study = flown.core, flown.core.study
-    ends = facts(end_rows(flown.plan._flight, flown.plan._aspects))
-    yield Group(Text("Nominal case", style="bold"), ends)
-    yield Group(*tolerance_budget(results))
-    if worst:
-        cases = case_table(study, FLOWN_OUTPUTS, _worst(results, worst), _effects(study))
-        one = Text(f"Inspect one: nutdamp disperse, as here, with {again(results)}", "dim")
-        yield Group(Text(cases.title, "bold"), cases.screen("screen"), one)
+def drawn(results: Results | LoopResults) -> str:
+    """Clause on the cases that were flown."""
+    redrawn = f", unphysical and drawn again: {results.redrawn:,}" if results.redrawn else ""
+    return f"cases: {results.done:,}, seed {results.study.seed}{redrawn}"
+
+
+def inspected(cases: DataTable, command: str) -> Group:
+    """The table of the worst cases, and the ``command`` that shows one of them."""
+    one = Text(f"Inspect one: {command}", "dim")
+    return Group(Text(cases.title, "bold"), cases.screen("screen"), one)
 
 
 def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
@@ -174,7 +174,7 @@ def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
         "final": decisions.final_json(study.nominal),
         "target": decisions.target_json(spacecraft),
         "exact_percentiles": results.exact,
-        "percentiles": percentiles_of(results, FLOWN_OUTPUTS, study.outputs_of({})),
+        "percentiles": percentiles_json(results, FLOWN_OUTPUTS, study.outputs_of({})),
         "requirement": requirement_of(flown.verdict),
         "decision": verdicts.verdict_json(flown.verdict),
         **cones_json(results),
@@ -183,7 +183,7 @@ def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
         **correlation_json(spacecraft),
         "unused": [entry.name for entry in study.model.inputs.unused],
         "unused_because": dict(study.model.inputs.unused),
-        "worst": [row.data for row in _worst(results, worst)],
+        "worst": worst_cases(results, worst).json(),
     }
 
 
@@ -195,10 +195,13 @@ def counts_json(results: Results | LoopResults) -> dict[str, Any]:
     return counts | values_of(results, "seed=study.seed", "redrawn")
 
 
-def _worst(results: Results, count: int) -> list[CaseRow]:
+def worst_cases(results: Results, count: int, effects: Array | None = None) -> DataTable:
+    """`case_table` of so many cases, the worst first."""
     study = results.study
-    cases = results.worst.cases[:count].tolist()
-    return [_flown(study, case, study.draws_of(case)) for case in cases]
+    rows = [
+        _flown(study, case, study.draws_of(case)) for case in results.worst.cases[:count].tolist()
+    ]
+    return case_table(study, FLOWN_OUTPUTS, rows, effects)
 
 
 def again(results: Results | LoopResults) -> str:
@@ -209,76 +212,63 @@ def again(results: Results | LoopResults) -> str:
 # --- percentiles
 
 
-def percentiles_json(
-    column: str, nominal: float | None, distribution: Distribution | None
-) -> dict[str, float | None]:
-    """The ``nominal`` value and the distribution in the unit of a ``column``."""
-    values: dict[str, float | None] = dict.fromkeys(("nominal", "min", *LEVELS, "max"))
-    values["nominal"] = nominal
-    if distribution is not None:
-        levels = distribution.quantiles(np.array(PERCENTS) / 100.0).tolist()
-        values |= zip(LEVELS, levels, strict=True)
-        values["min"] = distribution.minimum
-        values["max"] = distribution.maximum
-    return {name: None if value is None else shown(column, value) for name, value in values.items()}
-
-
-def percentiles_of(
-    results: Results | LoopResults, outputs: Sequence[StudyOutput], nominal: Array
-) -> dict[str, dict[str, float | None]]:
-    """`percentiles_json` of all outputs, by their keys."""
-    return {
-        output.key: percentiles_json(output.key, value, results.distribution(output.name))
-        for output, value in zip(outputs, nominal.tolist(), strict=True)
-    }
-
-
 def percentile_table(
     results: Results | LoopResults,
     outputs: Sequence[StudyOutput],
     nominal: Array,
     *,
     alone: bool = False,
+    sizes: bool = True,
 ) -> DataTable:
-    """One row an output: values by shares of the cases, or their sizes, to the digits of the
-    largest; ``alone``: nominal ones with digits of their own, as other places show them.
+    """One row an output: values by shares of the cases, with ``sizes`` those of signed ones, to the
+    digits of the largest; ``alone``: nominal ones with digits of their own, as other places show
+    them.
     """
     rows = []
     for output, value in zip(outputs, nominal.tolist(), strict=True):
         distribution = results.distribution(output.name)
-        if distribution is None:
-            value = None
-        elif output.signed:
-            value = abs(value)
-            distribution = distribution.sizes()
+        values = {"nominal": value}
+        if distribution is not None:
+            if output.signed and sizes:
+                distribution = distribution.sizes()
+                values["nominal"] = abs(value)
+            levels = distribution.quantiles(np.array(PERCENTS) / 100.0).tolist()
+            values |= {"min": distribution.minimum, "max": distribution.maximum}
+            values |= zip(LEVELS, levels, strict=True)
+        rows.append((output, {key: shown(output.key, size) for key, size in values.items()}))
+
+    def text(key: str, row: tuple[StudyOutput, dict[str, float]]) -> str | None:
+        output, values = row
+        size = values.get(key, math.nan)
+        if math.isnan(size) or "max" not in values:
+            return None
         scale = output.shown_unit[1]
-        values = percentiles_json(output.key, value, distribution)
-        largest = abs(scale * (values["max"] or 0.0))
-        row = dict[str, str | None]()
-        row[""] = output.label
-        for key, size in values.items():
-            if size is None or math.isnan(size):
-                row[key] = None
-            else:
-                row[key] = beside(scale * size, largest) if output.unit else f"{size:.0f}"
-        plain = values["nominal"]
-        if alone and plain is not None:
-            size = abs(scale * plain)
-            row["nominal"] = "0" if size < NOTHING else digits(size, 4)
-        rows.append(row)
-    return DataTable("Percentiles", PERCENTILES, rows)
+        if not output.unit:
+            return f"{size:.0f}"
+        if alone and key == "nominal":
+            return "0" if abs(scale * size) < NOTHING else digits(abs(scale * size), 4)
+        return beside(scale * size, abs(scale * values["max"]))
+
+    def column(key: str, heading: str, where: str) -> Column:
+        words = partial(text, key)
+        return Column(key, heading, "", lambda row: row[1].get(key), where=where, words=words)
+
+    columns = (
+        Column("", "", "", lambda row: row[0].label, where=BOTH, kind=TEXT),
+        column("nominal", Shared.NOMINAL, f"{BOTH} json"),
+        column("min", "", "json"),
+        *(column(key, f"{key} %", f"{BOTH if key in BRIEFLY else 'full'} json") for key in LEVELS),
+        column("max", Shared.MOST, f"{BOTH} json"),
+    )
+    return DataTable("Percentiles", columns, rows)
 
 
-# columns of rows of texts: the name without a key, the values by the names of `percentiles_json`
-PERCENTILES = (
-    Column("", "", "", itemgetter(""), where=BOTH, kind=TEXT),
-    Column("", Shared.NOMINAL, "", itemgetter("nominal"), where=BOTH),
-    *(
-        Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full")
-        for key in LEVELS
-    ),
-    Column("", Shared.MOST, "", itemgetter("max"), where=BOTH),
-)
+def percentiles_json(
+    results: Results | LoopResults, outputs: Sequence[StudyOutput], nominal: Array
+) -> dict[str, dict[str, float | None]]:
+    """Rows of `percentile_table` with signed values, by the keys of their outputs."""
+    table = percentile_table(results, outputs, nominal, sizes=False)
+    return dict(zip((output.key for output in outputs), table.json(), strict=True))
 
 
 def shown(column: str, value: float) -> float:
@@ -325,80 +315,48 @@ def requirement_of(judged: Verdict) -> dict[str, Any] | None:
 
 def cones_json(results: Results | LoopResults) -> dict[str, Any]:
     """Number of cases that break each cone, and least and largest angle from it to the axis;
-    nothing without cones.
+    nothing without cones, or before the first case.
     """
-    entries = [entry for _, entry in _cones(results)]
-    return {"aspects": entries} if entries else {}
-
-
-def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any]]]:
-    """Each cone with its entry in files; none before the first case."""
-    spacecraft = results.study.model.spacecraft
-    nominal = (
-        np.degrees(results.study.nominal_aspects).tolist()
-        if results.done and spacecraft.keep
-        else ()
-    )
-    for index, (keep, (near, far)) in enumerate(zip(spacecraft.keep, nominal, strict=False)):
-        nearest, farthest = np.degrees(results.aspects[index]).tolist()
+    keeps = results.study.model.spacecraft.keep
+    if not (results.done and keeps):
+        return {}
+    angles = np.degrees([results.aspects, results.study.nominal_aspects]).transpose(1, 0, 2)
+    names = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
+    entries = []
+    for keep, broken, sizes in zip(keeps, results.broken, angles.reshape(-1, 4), strict=True):
         entry = values_of(keep, "name", "min_deg=least", "max_deg=most")
-        entry |= {"broken_fraction": float(results.broken[index] / results.done)}
-        entry |= {"least_deg": nearest, "largest_deg": farthest}
-        yield keep, entry | {"nominal_least_deg": near, "nominal_largest_deg": far}
+        entry["broken_fraction"] = float(broken / results.done)
+        entries.append(entry | dict(zip(names, sizes.tolist(), strict=True)))
+    return {"aspects": entries}
 
 
 # --- cases
 
 
 class CaseRow(NamedTuple):
-    """A case: its object in JSON files, deviations of its inputs, ending of a loop."""
+    """A case, from 0, or `ESTIMATE`: deviations of its inputs, outputs, angles (m, 2) rad to cones,
+    ending of a loop.
+    """
 
-    data: dict[str, Any]
+    case: int
     draws: Mapping[str, float]
+    values: Sequence[float]
+    angles: Array | None = None
     stop: Ending | None = None
 
 
 ESTIMATE = -1  # number of the nominal case
 
 
-def case_row(
-    study: Study | LoopStudy,
-    outputs: Sequence[StudyOutput],
-    case: int,
-    draws: Mapping[str, float],
-    values: Sequence[float],
-    angles: Array | None,
-    stop: Ending | None = None,
-) -> CaseRow:
-    """Row of a case, from 0, or `ESTIMATE`: deviations of inputs, outputs, angles (m, 2) rad to
-    cones.
-    """
-    inputs = {
-        entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn
-    }
-    data: dict[str, Any] = {"case": case + 1, "inputs": inputs}
-    for output, value in zip(outputs, values, strict=True):
-        data[output.key] = None
-        if not math.isnan(value):
-            data[output.key] = shown(output.key, value) if output.unit else int(value)
-    if angles is not None and study.model.spacecraft.keep:
-        pairs = zip(study.model.spacecraft.keep, np.degrees(angles).tolist(), strict=True)
-        data["aspects"] = [
-            {"name": keep.name, "least_deg": near, "largest_deg": far}
-            for keep, (near, far) in pairs
-        ]
-    return CaseRow(data, draws, stop)
-
-
 def _flown(study: Study, case: int, draws: Mapping[str, float]) -> CaseRow:
     aspects = study.ends_of(draws).aspects
     angles = None if aspects is None else aspects[:, :, 0]
-    return case_row(study, FLOWN_OUTPUTS, case, draws, study.outputs_of(draws).tolist(), angles)
+    return CaseRow(case, draws, study.outputs_of(draws).tolist(), angles)
 
 
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
     """One case (from 0): the true value of each input, in SI, and the outputs."""
-    return _flown(study, case, draws).data
+    return case_table(study, FLOWN_OUTPUTS, [_flown(study, case, draws)]).json()[0]
 
 
 def case_table(
@@ -412,35 +370,51 @@ def case_table(
     """
     spacecraft, inputs = study.model.spacecraft, study.model.inputs.drawn
 
-    def value_of(*keys: str | int) -> Callable[[CaseRow], Any]:
-        def value(row: CaseRow) -> Any:
-            entry: Any = row.data
-            for key in keys:
-                entry = entry[key]
-            return entry
+    def true(entry: DispersedInput, row: CaseRow) -> float:
+        return entry.nominal + row.draws.get(entry.name, 0.0)
 
-        return value
+    def in_file(entry: DispersedInput, row: CaseRow) -> float:
+        return math.degrees(true(entry, row)) if entry.unit == "rad" else true(entry, row)
 
-    def degrees_of(name: str) -> Callable[[CaseRow], float]:
-        return lambda row: math.degrees(row.data["inputs"][name])
+    def angle(at: int, end: int, row: CaseRow) -> float | None:
+        return None if row.angles is None else math.degrees(row.angles[at][end])
+
+    def output_of(at: int, row: CaseRow) -> float | None:
+        value = row.values[at]
+        if math.isnan(value):
+            return None
+        return shown(outputs[at].key, value) if outputs[at].unit else int(value)
+
+    def cones(row: CaseRow) -> list[dict[str, Any]]:
+        return [
+            {"name": keep.name, "least_deg": angle(at, 0, row), "largest_deg": angle(at, 1, row)}
+            for at, keep in enumerate(spacecraft.keep)
+        ]
 
     columns = [
-        Column("case", "case", "", value_of("case"), where="screen csv", kind=WHOLE),
+        Column("case", "case", "", lambda row: row.case + 1, where="screen csv json", kind=WHOLE),
         Column(
             "",
             "",
             "",
-            lambda row: Shared.THIS_CASE if row.data["case"] else Shared.NOMINAL,
+            lambda row: Shared.NOMINAL if row.case == ESTIMATE else Shared.THIS_CASE,
             where="case",
             kind=TEXT,
         ),
+        Column(
+            "inputs",
+            "",
+            "",
+            lambda row: {entry.name: true(entry, row) for entry in inputs},
+            where="json",
+        ),
+        Column("aspects", "", "", cones, where="json" if spacecraft.keep else ""),
     ]
     for entry in inputs:
-        value = degrees_of(entry.name) if entry.unit == "rad" else value_of("inputs", entry.name)
-        columns.append(Column(column(entry), "", "", value, where="csv"))
-    for output in outputs:
-        value = value_of(output.key)
-        where = "csv screen" if output.ranks else "csv"
+        columns.append(Column(column(entry), "", "", partial(in_file, entry), where="csv"))
+    for at, output in enumerate(outputs):
+        value = partial(output_of, at)
+        where = "csv json screen" if output.ranks else "csv json"
         text = to_figures(4, output.scale)
         columns.append(Column(output.key, output.heading, output.unit, value, text, where))
         text = _text_beside(output, map(value, rows))
@@ -457,11 +431,11 @@ def case_table(
     )
     keys = iter(cone_columns(spacecraft))
     for at, keep in enumerate(spacecraft.keep):
-        angles = (("least", keep.least > 0.0), ("largest", keep.most < math.pi))
-        for which, bounded in angles:
-            value = value_of("aspects", at, f"{which}_deg")
+        ends = (("least", keep.least > 0.0), ("largest", keep.most < math.pi))
+        for end, (which, bounded) in enumerate(ends):
             where = "csv case screen" if bounded else "csv case"
             heading = f"{which} from {keep.name}"
+            value = partial(angle, at, end)
             columns.append(Column(next(keys), heading, "deg", value, to_figures(4), where))
     ranked = "inputs" if effects is None else "contributors"
     largest = partial(_largest, inputs, effects)
@@ -494,16 +468,29 @@ def _effects(study: Study) -> Array:
     return np.hypot(*(study.first_order.effects(output) for output, _ in budgeted_outputs(study)))
 
 
-def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
+def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> Group:
     """One case (from 0): every input, and the ends of it and of the nominal case."""
     rows = [_flown(study, ESTIMATE, {}), _flown(study, case, draws)]
-    outcome = case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
-    title = named(study.model.spacecraft, f": {scheme}, seed {study.seed}, case {case + 1}")
-    inputs = inputs_table(study.model.inputs.drawn, draws)
-    parts: list[RenderableType] = [title, Text(), inputs, Text(), outcome.transposed("case")]
-    if study.ends_of(draws).drained > 1.0:
-        parts.append(Text(f"Tank empty too soon: {EMPTY}.", "red"))
-    return Group(*parts)
+    empty = Text(f"Tank empty too soon: {EMPTY}.", "red")
+    told = [empty] if study.ends_of(draws).drained > 1.0 else []
+    return one_case(study, FLOWN_OUTPUTS, scheme, rows, told)
+
+
+def one_case(
+    study: Study | LoopStudy,
+    outputs: Sequence[StudyOutput],
+    name: str,
+    rows: Sequence[CaseRow],
+    told: Sequence[Text],
+) -> Group:
+    """The screen of a case: its inputs, its end beside the nominal one, ``rows`` of both, and what
+    is ``told`` of it.
+    """
+    row = rows[-1]
+    title = named(study.model.spacecraft, f": {name}, seed {study.seed}, case {row.case + 1}")
+    inputs = inputs_table(study.model.inputs.drawn, row.draws)
+    ends = case_table(study, outputs, rows).transposed("case")
+    return Group(title, Text(), inputs, Text(), ends, *told)
 
 
 def _shares(results: Results) -> Iterator[dict[str, Any]]:
@@ -538,13 +525,21 @@ ROUNDING = 1e-12  # rad; a smaller variation is rounding
 
 
 def tolerance_budget(results: Results) -> list[RenderableType]:
-    """Shares of the variance by input, by first order and by the cases, and the tolerances that
-    count most.
+    """The table of `budget_of` under its title, and its caption."""
+    table, caption = budget_of(results)
+    if table is None:
+        return [Text(caption)]
+    return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim")]
+
+
+def budget_of(results: Results) -> tuple[DataTable | None, str]:
+    """Shares of the variance by input, by first order and by the cases, with a caption; the caption
+    alone where nothing varies.
     """
     study = results.study
     inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
     if not any(entry.sigma for entry in inputs):
-        return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
+        return None, "Nothing varies from case to case, so there is no tolerance budget."
     outputs = budgeted_outputs(study)
     units = together(inputs, study.model.groups)  # places of inputs that vary together
 
@@ -602,21 +597,11 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         caption += (
             " Correlated inputs vary together: their effect is the root mean square of the group."
         )
-    return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim")]
+    return table, caption
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f}" if share >= 5e-4 else "0"
-
-
-def leading(part: str, shares: Mapping[str, float]) -> Iterator[Note]:
-    """The largest ``shares`` of the variance of ``part``,
-    by the names of their inputs for people.
-    """
-    ranked = sorted(shares.items(), key=lambda item: -item[1])
-    causes = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= MAIN]
-    if any(shares.values()):
-        yield note("main-causes", part=part, causes=", ".join(causes or [ranked[0][0]]))
 
 
 def unused_notes(unused: Iterable[Unused]) -> Iterator[Note]:
@@ -717,3 +702,11 @@ def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
     pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
     return {"correlation": [list(pair) for pair in pairs]} if pairs else {}
+
+
+def worst_table(results: Results, count: int) -> DataTable:
+    """The worst cases, one row each, with what contributes most."""
+    study = results.study
+    cases = results.worst.cases[:count].tolist()
+    rows = [_flown(study, case, study.draws_of(case)) for case in cases]
+    return case_table(study, FLOWN_OUTPUTS, rows, _effects(study))

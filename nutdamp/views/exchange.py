@@ -110,9 +110,10 @@ def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
     from nutdamp.files.ccsds import message, write
     from nutdamp.files.export import reference, stk_attitude
     from nutdamp.flight.propagation import flown
+    from nutdamp.spacecraft import directions
 
     place = reference(plan.spacecraft)  # refuses a file without epoch or frame
-    spacecraft = plan.spacecraft.seen_in(place.frame)
+    spacecraft = directions.seen_in(plan.spacecraft, place.frame)
     plan = replace(plan, spacecraft=spacecraft)
     last = until if row.track else plan.pulses.end
     if spacecraft.utc(last) is None:

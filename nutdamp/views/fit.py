@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import Any
 
 from rich.console import RenderableType
@@ -30,7 +30,7 @@ from nutdamp.estimation.search import MOVED, Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import heading, opening
-from nutdamp.views.parts import direction_columns, summary
+from nutdamp.views.parts import Summary, direction_columns
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, to_figures, values_of
 from nutdamp.views.text import fixed, note_json
 
@@ -66,11 +66,6 @@ def _value(row: Estimate) -> str:
     return f"{shown * _unit(row)[1]:.{_digits(row)}g}"
 
 
-def _sigma(row: Estimate) -> str | None:
-    sigma = _scaled("sigma", row)
-    return None if sigma is None else f"{sigma:.2g}"
-
-
 def _file(row: Estimate) -> str | None:
     digits = max(_digits(row) - 2, 4)
     return None if row.file is None else f"{row.file * _unit(row)[1]:.{digits}g}"
@@ -80,11 +75,6 @@ def _changed(change: float) -> str:
     if abs(change) <= NOTHING:
         return "0"
     return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
-
-
-def _stays(row: Estimate) -> bool:
-    """True where the file has the value already, within its tolerance."""
-    return row.change is not None and abs(row.change) <= MOVED
 
 
 def _digits(estimate: Estimate) -> int:
@@ -112,7 +102,7 @@ ESTIMATES = (
         "",
         lambda row: row.sigma * row.factor,
         where="screen json",
-        words=_sigma,
+        words=lambda row: None if math.isinf(row.sigma) else f"{_scaled('sigma', row):.2g}",
     ),
     Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
     Column("file", "file", "", partial(_scaled, "file"), where="screen json", words=_file, rank=1),
@@ -213,19 +203,22 @@ def fit_screen(fit: Fit, time: float, *, verbose: bool = True) -> RenderableType
     what = f", {record.start:g} s to {record.end:g} s{turns}{fired}"
     headline = Text.assemble("FIT ", (", ".join(names), "bold"), what)
     head = [*opening(spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
-    # Where not all fit, what moved from the file stands before what did not.
-    table = DataTable("Estimates", ESTIMATES, rows if verbose else sorted(rows, key=_stays))
+    if not verbose:
+        # Where not all fit, what moved from the file stands before what did not.
+        stays = [row.change is not None and abs(row.change) <= MOVED for row in rows]
+        rows = tuple(row for _, row in sorted(zip(stays, rows, strict=True), key=itemgetter(0)))
+    table = DataTable("Estimates", ESTIMATES, rows)
     head.append(Text(f"motion at t = {time:g} s"))
     directions = pointing_table(fit, time)
     if directions.rows:
         head.append(directions.screen("screen"))
-    return summary(
+    signals = [signal_table(fit).screen("screen")] if verbose else []
+    return Summary(
         head,
-        lambda first=None: table.screen("screen", first=first and max(first, 3)),
+        lambda first=None: [table.screen("screen", first=first and max(first, 3)), *signals],
         [*told(fit, rows)],
         "-o now.yaml · --plot fit.png",
-        more=[signal_table(fit).screen("screen")],
-        verbose=verbose,
+        verbose,
     )
 
 

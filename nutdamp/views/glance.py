@@ -8,7 +8,7 @@ from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -92,16 +92,19 @@ def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[Plan], Any]:
 
 def end_facts(plan: Plan) -> Table:
     """Final spin axis, H and spin, cost, and end time."""
+    return facts(final_rows(plan))
+
+
+def final_rows(plan: Plan) -> list[tuple[str, str]]:
+    """Names and values of the final spin axis, H and spin, cost, and end time."""
     pulses = plan.pulses
     name = "impulse" if pulses.propellant is None else "propellant"
     end = moment(pulses.end) if len(pulses) else "no pulse is needed"
-    return facts(
-        [
-            *end_rows(plan._flight, plan._aspects),
-            (name, f"{verdicts.spent(pulses)}, pulses: {len(pulses)}"),
-            ("last pulse ends", end),
-        ]
-    )
+    return [
+        *end_rows(plan._flight, plan._aspects),
+        (name, f"{verdicts.spent(pulses)}, pulses: {len(pulses)}"),
+        ("last pulse ends", end),
+    ]
 
 
 def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
@@ -309,23 +312,22 @@ def glance(compared: Comparison, robust: Sequence[Note] | None = None) -> Render
     ending: list[RenderableType] = []
     if plan is not None:
         head.append(verdicts.coloured(verdicts.statement(judged), judged.light))
-        ending = [verdicts.bound_table(judged).screen("screen"), axis_line(plan), Text()]
+        later = f" {lasting(plan._flight)}" if len(plan.pulses) else ""
+        axis = Text.assemble(("axis  ", "dim"), f"{_axis(plan)}{later}".rstrip())
+        ending = [verdicts.bound_table(judged).screen("screen"), axis, Text()]
         if plan.pulses.blocks:
             fired = parts.block_table(plan._flight)
         else:
             fired = parts.pulse_table(plan._flight, limit=limits(compared.spacecraft)[0])
     schemes = scheme_table(compared, plan).screen("screen")
 
-    def table(first: int | None = None) -> RenderableType:
-        rows = (
-            [*ending, fired.screen("screen", first=first), Text()]
-            if fired is not None and fired.rows
-            else ending
-        )
-        return Group(*rows, schemes)
+    def tables(first: int | None = None) -> list[RenderableType]:
+        if fired is None or not fired.rows:
+            return [*ending, schemes]
+        return [*ending, fired.screen("screen", first=first), Text(), schemes]
 
     every = [*(robust or ()), *notes(compared, robust=robust is not None)]
-    return parts.summary(head, table, every, parts.STEP.join(steps(plan)), lines=LINES)
+    return parts.Summary(head, tables, every, parts.STEP.join(steps(plan)), lines=LINES)
 
 
 LINES = (24, 30)  # of the screen, and of one narrower than 80 characters
@@ -371,7 +373,7 @@ def headline(compared: Comparison) -> Text:
     return Text.assemble((lead, f"bold {verdicts.STYLES[judged.light]}"), about)
 
 
-def ends(plan: Plan) -> Table:
+def ends(plan: Plan) -> list[tuple[str, str]]:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     flight, spacecraft = plan._flight, plan.spacecraft
     residual = flight.residual
@@ -394,13 +396,7 @@ def ends(plan: Plan) -> Table:
     rows = [("after pulses, deg", "  ".join(angles)), ("H", momentum), ("axis", _axis(plan))]
     if len(plan.pulses) and lasting(flight):
         rows.append(("", lasting(flight)))
-    return facts(rows)
-
-
-def axis_line(plan: Plan) -> Text:
-    """Direction of the spin axis after the pulses, and what changes it then."""
-    later = lasting(plan._flight) if len(plan.pulses) else ""
-    return Text.assemble(("axis  ", "dim"), _axis(plan), f" {later}" if later else "")
+    return rows
 
 
 def _axis(plan: Plan) -> str:

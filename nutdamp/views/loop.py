@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -28,7 +27,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, tables
 from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import heading, opening
-from nutdamp.views.parts import pulse_table, seconds, summary
+from nutdamp.views.parts import Summary, pulse_table, seconds
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -209,17 +208,15 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
         screen_line(stopped(run)) if run.stop.fault else stated,
         verdicts.bound_table(judged).screen("screen"),
     ]
-    return summary(
-        head,
-        partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
-        _notes(plan, judged),
-        "--plot loop.png · nutdamp disperse --loop",
-        more=[
-            margin_table(plan.margins).screen("screen"),
-            facts(glance.end_rows(plan._flight, plan._aspects)),
-        ],
-        verbose=verbose,
-    )
+    ends = facts(glance.end_rows(plan._flight, plan._aspects))
+    more = [margin_table(plan.margins).screen("screen"), ends] if verbose else []
+
+    def tables(first: int = SHOWN - 1) -> list[RenderableType]:
+        firings = [firing_table(run).screen("screen", first=first)] if run.fired else []
+        return [*firings, *more]
+
+    steps = "--plot loop.png · nutdamp disperse --loop"
+    return Summary(head, tables, [*_notes(plan, judged)], steps, verbose)
 
 
 def _notes(plan: LoopPlan, judged: Verdict) -> Iterator[Note]:
@@ -501,9 +498,12 @@ def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
         *opening(budget.spacecraft, verbose),
         *(Text(line, "bold") for line in sentences(_outlook(budget))),
     ]
-    rows = partial(budget_table(budget).screen, "screen") if budget.held else None
+
+    def tables(first: int | None = None) -> list[RenderableType]:
+        return [budget_table(budget).screen("screen", first=first)] if budget.held else []
+
     steps = "--csv budget.csv · --plot budget.png · nutdamp loop"
-    return summary(head, rows, _budget_notes(budget), steps, verbose=verbose)
+    return Summary(head, tables, [*_budget_notes(budget)], steps, verbose)
 
 
 def _outlook(budget: Budget) -> Iterator[Note]:

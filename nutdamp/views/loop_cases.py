@@ -5,7 +5,7 @@ one case alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import IO, Any
@@ -15,7 +15,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp import __version__
-from nutdamp.common.results import Note
+from nutdamp.common.results import Note, note
 from nutdamp.control_loop.controller import Ending
 from nutdamp.control_loop.dispersion import LoopDispersion, LoopResults, LoopStudy
 from nutdamp.control_loop.simulation import FlownLoops
@@ -27,18 +27,15 @@ from nutdamp.views.dispersion import (
     MOST_ROWS,
     CaseRow,
     StudyOutput,
-    case_row,
     correlation_json,
     in_words,
-    inputs_table,
-    leading,
     size_text,
     unused_notes,
 )
 from nutdamp.views.loop import described
-from nutdamp.views.parts import named, summary
+from nutdamp.views.parts import STEP, Summary, named
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared
-from nutdamp.views.text import degrees, duration, screen_line
+from nutdamp.views.text import degrees, duration
 from nutdamp.views.verdict import percent, verdict_json
 
 SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`
@@ -56,70 +53,61 @@ SHARED = tuple(output for output in SHOWN_OUTPUTS if output.ranks and output.uni
 """Outputs whose dependence on the inputs is shown."""
 
 
-def _cases(study: LoopStudy, rows: Sequence[CaseRow]) -> DataTable:
+def worst_cases(results: LoopResults, count: int) -> DataTable:
+    """`case_table` of so many cases, the worst first."""
+    study = results.study
+    rows = [
+        CaseRow(
+            case,
+            study.draws_of(case),
+            results.values[:, case].tolist(),
+            results.angles[:, :, case],
+        )
+        for case in results.worst.cases[:count].tolist()
+    ]
     return dispersion.case_table(study, SHOWN_OUTPUTS, rows)
 
 
-def _row(study: LoopStudy, case: int, values: Array, angles: Array | None, **more: Any) -> CaseRow:
-    draws = study.draws_of(case)
-    return case_row(study, SHOWN_OUTPUTS, case, draws, values.tolist(), angles, **more)
-
-
-def _worst(results: LoopResults, count: int) -> list[CaseRow]:
-    return [
-        _row(results.study, case, results.values[:, case], results.angles[:, :, case])
-        for case in results.worst.cases[:count].tolist()
-    ]
-
-
 def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
-    values = study.measured(flown)[0][:, 0]
-    return _row(study, case, values, flown.aspects[:, :, 0], stop=flown.pilots[0].ending[0])
+    values = study.measured(flown)[0][:, 0].tolist()
+    ending = flown.pilots[0].ending[0]
+    return CaseRow(case, study.draws_of(case), values, flown.aspects[:, :, 0], ending)
 
 
 def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True) -> RenderableType:
     """The screen of ``disperse --loop``: verdict, percentiles, main causes, and worst cases."""
     results, study = flown.core, flown.core.study
-    drawn = f"cases: {results.done:,}, seed {study.seed}"
-    if results.redrawn:
-        drawn += f", unphysical ones drawn again: {results.redrawn:,}"
+    drawn = dispersion.drawn(results)
     title = named(study.spacecraft, f": loop, 0 to {duration(study.until)}, {drawn}")
-    head = [title, Text(described(study.law.loop))]
+    head = [title, Text(described(study.law.loop)), *_verdicts(flown)]
     percentiles = dispersion.percentile_table(results, SHOWN_OUTPUTS, study.nominal)
-    unused = study.model.inputs.unused
+    notes = [*unused_notes(study.model.inputs.unused)]
+    again = dispersion.again(results) if len(results.worst.cases) else ""
     if not verbose:
-        notes = list[Note]()
-        for output, part in zip(
-            SHARED, ("the time to quiet", "the largest nutation", "propellant"), strict=True
-        ):
-            shares = results.shares(output.name).items()  # the rest is noise
-            main = {in_words(name): share for name, share in shares if share >= MAIN}
-            notes += leading(part, main)
-        steps = "--csv cases.csv"
-        if len(results.worst.cases):
-            steps += f" · {dispersion.again(results)} (worst)"
-        return summary(
-            [*head, *_verdicts(flown)],
-            lambda **_: percentiles.screen("screen"),
-            [*notes, *unused_notes(unused)],
-            steps,
-        )
-    parts: list[RenderableType] = [*head, Text(), percentiles.screen("full"), Text()]
-    parts += [*_verdicts(flown), *_shares(results)]
+        brief = percentiles.screen("screen")
+        steps = f"--csv cases.csv{STEP}{again} (worst)" if again else "--csv cases.csv"
+        return Summary(head, lambda **_: [brief], [*_causes(results), *notes], steps)
     anew = ", ".join(
         f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings
     )
+    tables: list[RenderableType] = [percentiles.screen("full"), *_shares(results)]
     if anew:
-        parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
-    rows = _worst(results, worst)
-    if rows:
-        table = _cases(study, rows)
-        options = dispersion.again(results)
-        parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
-        parts.append(
-            Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim")
-        )
-    return Group(*parts, *map(screen_line, unused_notes(unused)))
+        tables.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
+    if worst and again:
+        one = f"{again}; firing by firing: nutdamp loop {again}"
+        tables.append(dispersion.inspected(worst_cases(results, worst), one))
+    return Summary(head, lambda: tables, notes, verbose=True)
+
+
+def _causes(results: LoopResults) -> Iterator[Note]:
+    """The inputs that count most for each of `SHARED`, by their shares; the rest is noise."""
+    parts = ("the time to quiet", "the largest nutation", "propellant")
+    for output, part in zip(SHARED, parts, strict=True):
+        shares = results.shares(output.name)
+        main = sorted(filter(lambda name: shares[name] >= MAIN, shares), key=shares.__getitem__)
+        causes = [f"{in_words(name)} ({100 * shares[name]:.1f} %)" for name in reversed(main)]
+        if causes:
+            yield note("main-causes", part=part, causes=", ".join(causes))
 
 
 def _verdicts(flown: LoopDispersion) -> Iterator[RenderableType]:
@@ -192,45 +180,26 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
         ),
         ranked[:MOST_ROWS],
     )
-    yield from (Text(), Text(table.title, style="bold"), table.screen("screen"))
-    note = (
+    about = (
         "Squared correlation over the cases that fall quiet; "
         "the rest is noise and what is not linear."
     )
     if results.study.model.groups:
-        note += (
+        about += (
             " Of correlated inputs each has what it adds to those before it in the file's "
             "correlation."
         )
-    yield Text(note, "dim")
+    yield Group(Text(table.title, style="bold"), table.screen("screen"), Text(about, "dim"))
 
 
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    nominal = case_row(
-        study,
-        SHOWN_OUTPUTS,
-        dispersion.ESTIMATE,
-        {},
-        study.nominal.tolist(),
-        study.nominal_aspects,
-    )
-    table = _cases(study, [nominal, row]).transposed("case", names="")
-    title = named(study.spacecraft, f": loop, seed {study.seed}, case {case + 1}")
-    parts: list[RenderableType] = [
-        title,
-        Text(),
-        inputs_table(study.model.inputs.drawn, row.draws),
-        Text(),
-        table,
-    ]
+    nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
+    told = [Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim")]
     if row.stop is not None and row.stop is not Ending.END:
-        parts.append(Text.assemble(("Stopped: ", "bold red"), f"{row.stop.value}."))
-    parts.append(
-        Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim")
-    )
-    return Group(*parts)
+        told.insert(0, Text.assemble(("Stopped: ", "bold red"), f"{row.stop.value}."))
+    return dispersion.one_case(study, SHOWN_OUTPUTS, "loop", [nominal, row], told)
 
 
 def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
@@ -244,7 +213,7 @@ def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
         "until_s": study.until,
         **dispersion.counts_json(results),
         "alone_because": study.alone or None,
-        "percentiles": dispersion.percentiles_of(results, SHOWN_OUTPUTS, study.nominal),
+        "percentiles": dispersion.percentiles_json(results, SHOWN_OUTPUTS, study.nominal),
         "settled": _fraction(results.settled, results.done),
         "never_started": results.idle,
         "dead_band": {
@@ -263,7 +232,7 @@ def loop_cases_json(flown: LoopDispersion, *, worst: int) -> dict[str, Any]:
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
         "unused_because": dict(study.model.inputs.unused),
-        "worst": [row.data for row in _worst(results, worst)],
+        "worst": worst_cases(results, worst).json(),
     }
 
 
@@ -272,7 +241,7 @@ def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, 
     row = _flown_case(study, case, flown)
     data = {"nutdamp": __version__, "seed": study.seed, "until_s": study.until}
     data |= {} if row.stop is None else {"stopped": row.stop.name.lower()}
-    return data | row.data
+    return data | dispersion.case_table(study, SHOWN_OUTPUTS, [row]).json()[0]
 
 
 def _fraction(count: int, of: int) -> dict[str, float | None]:
@@ -286,7 +255,8 @@ class LoopCasesWriter:
     """
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
-        self._stream, self._study, self._table = stream, study, _cases(study, ())
+        self._stream, self._study = stream, study
+        self._table = dispersion.case_table(study, SHOWN_OUTPUTS, ())
         stream.write(self._table.csv().encode())
         stream.flush()
 
@@ -294,13 +264,19 @@ class LoopCasesWriter:
         """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m,
         2, n) rad.
         """
-        drawn = self._study.draws_of_all(np.arange(first, first + len(stops)))
-        rows = []
-        for row, stop in enumerate(stops):
-            draws = {
-                name: draw if isinstance(draw, float) else float(draw[row])
-                for name, draw in drawn.items()
-            }
-            of_case = values[:, row].tolist(), angles[..., row]
-            rows.append(case_row(self._study, SHOWN_OUTPUTS, first + row, draws, *of_case, stop))
+        numbers = np.arange(first, first + len(stops))
+        drawn = {
+            name: np.broadcast_to(draws, numbers.shape).tolist()
+            for name, draws in self._study.draws_of_all(numbers).items()
+        }
+        rows = [
+            CaseRow(
+                first + row,
+                {name: draws[row] for name, draws in drawn.items()},
+                values[:, row].tolist(),
+                angles[..., row],
+                stop,
+            )
+            for row, stop in enumerate(stops)
+        ]
         self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

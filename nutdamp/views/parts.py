@@ -7,12 +7,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.text import Text
 
 from nutdamp.common.results import Note
@@ -351,52 +352,14 @@ def block_table(flown: Flight) -> DataTable:
 
 LINES = (40, 40)  # of a default screen, and of one narrower than `WIDTH`
 NOTES = 3  # on it, at most, warnings among them
-# rows before the last one, and notes: the first that fits
-SIZES = (
-    (14, NOTES),
-    (8, NOTES),
-    (6, NOTES),
-    (4, NOTES),
-    (2, NOTES),
-    (4, 2),
-    (2, 2),
-    (1, 2),
-    (2, 1),
-    (1, 1),
-    (1, 0),
-)
-
-
-def summary(
-    head: Sequence[RenderableType],
-    table: Callable[..., RenderableType] | None,
-    notes: Iterable[Note],
-    steps: str,
-    *,
-    more: Iterable[RenderableType] = (),
-    verbose: bool = False,
-    lines: tuple[int, int] = LINES,
-) -> RenderableType:
-    """A default screen of at most so many ``lines``: its ``head``, a ``table`` by its ``first``
-    rows, notes, and ``steps`` to take next.
-
-    ``verbose``: with all rows and notes, and ``more`` parts.
-    """
-    ranked = sorted(ordered(notes), key=rank)
-    if not verbose:
-        return DefaultScreen(head, table, ranked, steps.split(STEP), lines, quiet())
-    body = [*head]
-    for part in (*([] if table is None else [table()]), *more):
-        body += [Text(), part]
-    return Group(*body, *([Text()] if ranked else []), *map(screen_line, ranked))
-
-
+ROWS = 14  # before the last one of its table, at most: further ones are alike
 STEP = " · "  # between two steps to take next
+BREAK = re.compile("[,;:] ")  # where `Clauses` may be broken
 
 
 class Clauses:
     """A line of text that is broken behind commas, where it does not fit and that takes no more
-    lines.
+    lines, so that values stay with their units.
     """
 
     def __init__(self, line: Text) -> None:
@@ -409,78 +372,63 @@ class Clauses:
             if lines[-1] and len(lines[-1]) + len(clause.plain.rstrip()) > width:
                 lines.append(Text())
             lines[-1].append_text(clause)
-        whole = lines_of(Group(*lines), width=width) <= lines_of(self.line, width=width)
+        whole = lines_of(*lines, width=width) <= lines_of(self.line, width=width)
         yield from lines if whole else [self.line]
 
 
-BREAK = re.compile("[,;:] ")  # where `Clauses` may be broken
+@dataclass(frozen=True)
+class Summary:
+    """The screen of every result: its ``head``, ``tables``, notes by what they change, and
+    ``steps`` to take next.
 
-
-class DefaultScreen:
-    """A head, a table, notes in the order of what they change, and steps to take next: as many rows
-    and notes as the lines of a screen hold, which is measured when it is shown.
-
-    Where it has lines left, tables tell which columns they leave out.
+    A default screen has at most so many ``lines``. As many notes and then rows are on it as these
+    hold, which is measured when it is shown: ``tables`` takes the number of rows ``first`` of a
+    table that may be long, before its last one. ``verbose``: all rows and notes, and no steps.
     """
 
-    def __init__(
-        self,
-        head: Sequence[RenderableType],
-        table: Callable[..., RenderableType] | None,
-        notes: Sequence[Note],
-        steps: Sequence[str],
-        lines: tuple[int, int],
-        silent: bool,
-    ) -> None:
-        self.head = [Clauses(part) if isinstance(part, Text) else part for part in head]
-        self.table, self.notes, self.lines, self.silent = table, notes, lines, silent
-        self.steps = [with_file(step) for step in steps]
+    head: Sequence[RenderableType]
+    tables: Callable[..., Sequence[RenderableType]]
+    notes: Sequence[Note] = ()
+    steps: str = ""
+    verbose: bool = False
+    lines: tuple[int, int] = LINES
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        notes = sorted(ordered(self.notes), key=rank)
+        if self.verbose:
+            below = [line for part in self.tables() for line in (Text(), part)]
+            yield from (*self.head, *below, *([Text()] if notes else []), *map(screen_line, notes))
+            return
         width = options.max_width
         limit = self.lines[width < WIDTH]
-        warned = min(sum(severity(entry) == WARNING for entry in self.notes), NOTES)
-        sizes = [size for size in SIZES if size[1] >= warned]
-        for blanks, (rows, count) in product((True, False), sizes):
-            every = self._parts(rows, count, width)
-            parts = [part for part in every if blanks or not isinstance(part, Text) or part.plain]
-            if lines_of(*parts, width=width) <= limit:
+        warned = min(sum(severity(entry) == WARNING for entry in notes), NOTES)
+        for blanks, count in product((True, False), range(NOTES, warned - 1, -1)):
+            spare = limit - lines_of(*self._parts(1, notes, count, width, blanks), width=width)
+            if spare >= 0:
                 break
-        for part in parts:
-            if isinstance(part, FittedColumns) and part.left_out(width) and not self.silent:
-                part.told = True
-                part.told = lines_of(*parts, width=width) <= limit
-        yield Group(*parts)
+        yield from self._parts(min(1 + max(spare, 0), ROWS), notes, count, width, blanks)
 
-    def _parts(self, rows: int, count: int, width: int) -> list[RenderableType]:
-        """Parts of the screen with so many rows before the last one, and so many notes."""
-        parts: list[RenderableType] = [*self.head]
-        if self.table is not None:
-            parts += [Text(), self.table(first=rows)]
-        parts = [*_ungrouped(parts)]
+    def _parts(
+        self, rows: int, notes: Sequence[Note], count: int, width: int, blanks: bool
+    ) -> list[RenderableType]:
+        """Parts of a default screen with so many rows before the last one, and so many notes."""
+        tables = self.tables(first=rows)
+        told = [screen_line(entry) for entry in notes if not is_detail(entry)]
+        told = told if quiet() else told[:count]
+        between = [Text()] if tables else []
+        head = [Clauses(part) if isinstance(part, Text) else part for part in self.head]
+        parts = [*head, *between, *tables, *(between if told else []), *told]
         for part in parts:
             if isinstance(part, FittedColumns):
-                part.shortened = True
-        told = [screen_line(entry) for entry in self.notes if not is_detail(entry)]
-        if not self.silent:
-            told = told[:count]
-        if told and self.table is not None:
-            parts.append(Text())
-        parts += told
-        if self.silent:
-            return parts
-        hidden = len(self.notes) - len(told)
-        last = "-v all values" + (f" ({hidden} more)" if hidden else "")
-        for step in self.steps:
-            if len(last) + len(STEP) + len(step) <= width:
-                last += STEP + step
-        return [*parts, Text(last, style="dim")]
-
-
-def _ungrouped(parts: Iterable[RenderableType]) -> Iterator[RenderableType]:
-    """Parts, and those of groups among them."""
-    for part in parts:
-        yield from _ungrouped(part.renderables) if isinstance(part, Group) else (part,)
+                part.brief = True
+        if not quiet():
+            hidden = len(notes) - len(told)
+            last = "-v all values" + (f" ({hidden} more)" if hidden else "")
+            for step in map(with_file, self.steps.split(STEP)):
+                if len(last) + len(STEP) + len(step) <= width:
+                    last += STEP + step
+            parts.append(Text(last, style="dim"))
+        return [part for part in parts if blanks or not isinstance(part, Text) or part.plain]
 
 
 def title(spacecraft: Spacecraft) -> Text:

@@ -24,7 +24,7 @@ from nutdamp.views import verdict as verdicts
 from nutdamp.views.decisions import derived_table, final_json, plan_json, target_json
 from nutdamp.views.dispersion import in_words, stated_text
 from nutdamp.views.glance import end_facts, glance, headline, notes, scheme_table
-from nutdamp.views.parts import named, pulse_table, summary
+from nutdamp.views.parts import Summary, named, pulse_table
 from nutdamp.views.simulation import blocks_screen
 from nutdamp.views.tables import (
     TEXT,
@@ -71,7 +71,7 @@ def comparison_screen(compared: Comparison) -> RenderableType:
             totals[pulse.channel] = totals.get(pulse.channel, 0.0) + pulse.loaded[1]
         on_times = ((f"on-time of {name}", f"{total:.4f} s") for name, total in totals.items())
         tables += [pulse_table(chosen._flight).screen("full"), facts(on_times)]
-    return summary(head, None, notes(compared, verbose=True), "", more=tables, verbose=True)
+    return Summary(head, lambda: tables, notes(compared, verbose=True), verbose=True)
 
 
 def robust_screen(robust: RobustComparison, *, verbose: bool = True) -> RenderableType:

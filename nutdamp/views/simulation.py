@@ -24,7 +24,6 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.tabular import number
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.cones import aspects
-from nutdamp.flight.end_state import LEGENDRE
 from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import angle_between, full_turn
@@ -114,13 +113,13 @@ def simulation_screen(
     until = moment(extremes.until)
     track = f"{extremes.rows} rows, 0 to {until}, by the {simulation.shown.model}"
     watched = parts.aspect_facts(aspects(simulation.shown, extremes.until)) if verbose else ()
-    return parts.summary(
+    more = [*_fired(simulation), facts([*watched, ("track", track)])] if verbose else []
+    return parts.Summary(
         head,
-        lambda **_: ends.transposed("screen", f"end of track, {until}"),
+        lambda **_: [ends.transposed("screen", f"end of track, {until}"), *more],
         [*_notes(simulation), *planned],
         parts.STEP.join(["--csv track.csv", "--plot motion.png", verify]),
-        more=[*_fired(simulation), facts([*watched, ("track", track)])] if verbose else (),
-        verbose=verbose,
+        verbose,
     )
 
 
@@ -154,12 +153,15 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
     if schedule.blocks:
         yield from blocks_screen(simulation.plan)
     if len(schedule):
-        shown = shown_rows(parts.pulse_table(flight), schedule)
-        yield shown.screen("simulate")
-        if len(shown.rows) < len(schedule):
-            yield Text(
-                f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim"
-            )
+        table, numbers = parts.pulse_table(flight), set[int]()
+        for own in schedule.pulses_by_block:
+            step = max(math.ceil((len(own) - 1) / (EVENLY - 1)), 1)
+            numbers |= {*own[::step], own[-1]}
+        # a track may end before the last one
+        rows = [table.rows[index] for index in sorted(numbers) if index < len(table.rows)]
+        yield replace(table, rows=rows).screen("simulate")
+        if len(rows) < len(schedule):
+            yield Text(f"{len(rows)} of {len(schedule)} pulses; --json writes all.", style="dim")
 
 
 def blocks_screen(plan: Plan) -> Iterator[RenderableType]:
@@ -190,17 +192,6 @@ def _effects(plan: Plan) -> Iterator[tuple[str, str]]:
 
 # largest number of pulses of a block on a screen: the first, the last, and evenly some between
 EVENLY = 8
-
-
-def shown_rows(table: DataTable, schedule: Schedule) -> DataTable:
-    """The pulses that a screen shows: all, but of long blocks only some."""
-    shown = set[int]()
-    for own in schedule.pulses_by_block:
-        step = max(math.ceil((len(own) - 1) / (EVENLY - 1)), 1)
-        shown |= {*own[::step], own[-1]}
-    # a track may end before the last one
-    rows = [table.rows[index] for index in sorted(shown) if index < len(table.rows)]
-    return replace(table, rows=rows)
 
 
 def simulation_json(simulation: Simulation) -> dict[str, Any]:
@@ -249,10 +240,8 @@ MOST_SPINS = 100_000  # largest number of spins: more make no table that anyone 
 DIGITS = 9  # decimals of seconds and degrees that are written
 # share of a spin after t = 0 within which the first Sun pulse comes at once: no spin is before it
 SAME = 1e-9
-PIECES = 16  # pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`
-NEWTON = (
-    3  # Newton steps to the end of a turn within its piece: the second one is at rounding already
-)
+GRID = 4  # times in each turn between which its begin is interpolated before it is refined
+NEWTON = 3  # Newton steps to the begin of a turn: the second one is at rounding already
 
 
 class SpinRow(NamedTuple):
@@ -341,22 +330,18 @@ def _begins(spacecraft: Spacecraft, schedule: Schedule, last: float) -> tuple[in
 
     if spacecraft.spin == 0.0:
         raise BadRequest("a table of turns needs a body that spins")
-    turn = spin_turn(spacecraft)
+    turn, sunlit = spin_turn(spacecraft), parts.sun_phased(spacecraft)
     until = last + 3.0 * turn
     for _ in range(2):  # where the spin falls, turns get longer
         flown = propagation.flown(spacecraft, schedule, until)
-        if spacecraft.sun is not None and spacecraft.sun_sensor is not None:
-            times = sun_pulses(flown, until)
-            at_once = len(times) > 0 and times[0] < SAME * turn
-            first, begins = (1, times) if at_once else (0, np.append(0.0, times))
-        else:
-            first = 1
-            begins = _turns(flown, until)
+        first = 1
+        begins = sun_pulses(flown, until) if sunlit else _turns(flown, until)
+        if sunlit and not (len(begins) and begins[0] < SAME * turn):
+            first, begins = 0, np.append(0.0, begins)
         if len(begins) > 2 and begins[-1] > last:
             return first, begins
-        until = last + 6.0 * 2.0 * math.pi / max(
-            abs(flown.settled.spin), 1e-3 * abs(spacecraft.spin)
-        )
+        slowest = max(abs(flown.settled.spin), 1e-3 * abs(spacecraft.spin))
+        until = last + 12.0 * math.pi / slowest
     raise BadRequest(f"no whole spin ends after {last:.4g} s: the spin comes to a halt")
 
 
@@ -364,38 +349,19 @@ def _turns(flown: Flight, until: float) -> Vector:
     """Times of 0, 1, 2, … turns of the body about axis 3, up to ``until`` s, (n,); none after the
     spin ends.
     """
-    spin = abs(flown.spacecraft.spin)
-    edges = [np.array([0.0])]
-    for leg in flown.legs:
-        if leg.start < until and leg.end > leg.start:
-            count = math.ceil((leg.end - leg.start) * spin * PIECES / (2.0 * math.pi)) + 1
-            edges.append(np.linspace(leg.start, leg.end, count + 1)[1:])
-    times = np.concatenate(edges)
-    gained = _turned(flown, times[:-1], times[1:])
-    gained = gained[np.logical_and.accumulate(gained > 0.0)]  # to where the spin is reversed
-    total = np.append(0.0, np.cumsum(gained))
-    whole = 2.0 * math.pi * np.arange(math.floor(total[-1] / (2.0 * math.pi)) + 1)
-    piece = np.clip(np.searchsorted(total, whole, "right") - 1, 0, len(gained) - 1)
-    begin, length = times[piece], np.diff(times)[piece]
-    ends = begin + length * (whole - total[piece]) / gained[piece]
+    spin = flown.spacecraft.spin
+    sense = math.copysign(1.0, spin)
+    times = np.linspace(0.0, until, math.ceil(GRID * until * abs(spin) / (2.0 * math.pi)) + 2)
+    turned = sense * end_state.spin_phases(flown, times)
+    ascending = np.append(True, np.logical_and.accumulate(np.diff(turned) > 0.0))
+    times, turned = times[ascending], turned[ascending]
+    whole = 2.0 * math.pi * np.arange(math.floor(turned[-1] / (2.0 * math.pi)) + 1)
+    begins = np.interp(whole, turned, times)
     for _ in range(NEWTON):
-        ends += (whole - total[piece] - _turned(flown, begin, ends)) * length / gained[piece]
-    return np.asarray(ends)
-
-
-def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
-    """∫ω3 dt over stretches (n,), rad, positive in the sense of the spin at t = 0; each within one
-    leg.
-    """
-    sense = math.copysign(1.0, flown.spacecraft.spin)
-    half = 0.5 * (ends - begins)
-    turned = np.zeros(len(begins))
-    for node, weight in (
-        (sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)
-    ):
-        rates, _ = flown.motion(begins + half * (1.0 + node))
-        turned += weight * half * sense * rates[:, 2]
-    return turned
+        rates = sense * flown.motion(begins)[0][:, 2]
+        begins += (whole - sense * end_state.spin_phases(flown, begins)) / rates
+        begins = np.clip(begins, 0.0, times[-1])
+    return np.asarray(begins)
 
 
 SHOWN = 1e-9 * math.pi / 180.0  # rad; smaller differences are shown as rounding
@@ -416,7 +382,7 @@ def verification_screen(
     spacecraft, judged = plan.spacecraft, plan.verdict
     confirmed = Light.GREEN if verification.agree else Light.RED
     lead, about = verdicts.headline(judged)
-    head = [
+    head: list[RenderableType] = [
         parts.named(spacecraft, f": {plan.scheme}"),
         verdicts.coloured(verdict(verification), confirmed),
         Text.assemble((lead, verdicts.STYLES[judged.light]), about),
@@ -440,15 +406,12 @@ def verification_screen(
     if not verbose and worst is not None and worst.nutation - least > SHOWN:
         angle = math.degrees(worst.nutation)
         notes.insert(1, note("largest-imperfection", imperfection=worst.name, nutation_deg=angle))
-    budget = budget_table(spacecraft, verification).screen("screen")
-    return parts.summary(
-        [*head, *((Text(), decisions.derived_table(spacecraft)) if verbose else ())],
-        lambda **_: methods_table(verification).screen("screen"),
-        notes,
-        "--json verified.json",
-        more=[Group(Text(BUDGET, "bold"), Text(), budget, Text(BUDGET_NOTE, "dim"))],
-        verbose=verbose,
-    )
+    tables: list[RenderableType] = [methods_table(verification).screen("screen")]
+    if verbose:
+        head += [Text(), decisions.derived_table(spacecraft)]
+        budget = budget_table(spacecraft, verification).screen("screen")
+        tables.append(Group(Text(BUDGET, "bold"), Text(), budget, Text(BUDGET_NOTE, "dim")))
+    return parts.Summary(head, lambda **_: tables, notes, "--json verified.json", verbose)
 
 
 def verification_json(verified: Verified) -> dict[str, Any]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ from rich.text import Text
 
 from nutdamp.common.numerics import MISSING
 from nutdamp.units import screen_unit
+from nutdamp.views.text import quiet
 
 GAPS = (2, 1)  # characters between two columns, and where there is little room
 WORD = re.compile(
@@ -80,63 +82,42 @@ class Shared:
 
 
 class FittedColumns(Table):
-    """A table with a line a row, however narrow the screen is.
+    """A table that leaves out columns where they do not fit side by side, those with the largest
+    rank first, of one rank the last first, and names them below.
 
-    Where its columns do not fit side by side, those with a rank are left out if it may be
-    ``shortened``, the largest rank first; if it is ``told``, a last line names them. What still
-    does not fit goes on below, beside the first column again.
+    ``brief``: those with a rank go before a cell takes a second line; else after that.
     """
 
     ranks: tuple[int, ...] = ()
-    shortened = False
-    told = False
-
-    def texts(self) -> list[list[str]]:
-        """Heading and cells of each column."""
-        return [[_plain_text(each.header), *map(_plain_text, each.cells)] for each in self.columns]
-
-    def left_out(self, room: int) -> list[int]:
-        """Places of the columns that ``room`` characters leave out."""
-        texts = self.texts()
-        shown = list(range(len(texts)))
-        while self.shortened and not fitted([texts[at] for at in shown], room, words=False):
-            ranked = max(shown, key=self.ranks.__getitem__)
-            if not self.ranks[ranked]:
-                break
-            shown.remove(ranked)
-        return [at for at in range(len(texts)) if at not in shown]
+    brief = False
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         every = list(self.columns)
-        texts = self.texts()
-        room = options.max_width
-        left_out = self.left_out(room)
-        shown = [at for at in range(len(every)) if at not in left_out]
-        while shown:
-            count = len(shown)
-            while count > 2 and not fitted([texts[at] for at in shown[:count]], room):
-                count -= 1
-            part, below = shown[:count], shown[count:]
-            widths, gap = fitted([texts[at] for at in part], room) or ([None] * count, 1)
-            self.columns = [
-                replace(every[at], width=width, _index=place)  # by it rich finds the last one
-                for place, (at, width) in enumerate(zip(part, widths, strict=True))
-            ]
-            self.padding = (0, gap, 0, 0)
-            yield from super().__rich_console__(console, options)
-            if below:
-                yield Text()
-            shown = [0, *below] if below else []
+        texts = [[_plain_text(each.header), *map(_plain_text, each.cells)] for each in every]
+        kept = sorted(range(len(every)), key=lambda at: (self.ranks[at], at))
+        while True:
+            shown = sorted(kept)
+            whole = self.brief and self.ranks[kept[-1]] > 0
+            fit = fitted([texts[at] for at in shown], options.max_width, words=not whole)
+            if fit is not None or len(kept) <= 2:
+                break
+            kept.pop()
+        widths, gap = fit or ([None] * len(shown), 1)
+        self.columns = [
+            replace(every[at], width=width, _index=place)  # by it rich finds the last one
+            for place, (at, width) in enumerate(zip(shown, widths, strict=True))
+        ]
+        self.padding = (0, gap, 0, 0)
+        yield from super().__rich_console__(console, options)
         self.columns = every
-        if self.told and left_out:
-            names = (" ".join(texts[at][0].split()) for at in left_out)
-            words = f"left out: {', '.join(names)}"
-            cure = " (-v or a wider screen)"
-            yield Text(words + cure if len(words + cure) <= room else words, style="dim")
+        names = [" ".join(texts[at][0].split()) for at in range(len(every)) if at not in shown]
+        if names and not quiet():
+            cure = " (-v or a wider screen)" if self.brief else " (a wider screen)"
+            yield Text(f"left out: {', '.join(names)}{cure}", style="dim")
 
 
 def fitted(
-    columns: list[list[str]], room: int, *, words: bool = True
+    columns: list[list[str]], room: int, *, words: bool
 ) -> tuple[Sequence[int | None], int] | None:
     """Characters for each column, whose first text is its heading, and between two; None without
     ``room``.
@@ -146,21 +127,20 @@ def fitted(
     reasons.
     """
     whole = [_longest(texts) for texts in columns]
-    lines = [
-        max(min(map(_longest, _halves(heading))), _longest(cells)) for heading, *cells in columns
-    ]
+    lines = []
+    for heading, *cells in columns:
+        blanks = [at for at, letter in enumerate(heading) if letter == " "]
+        halves = [_longest((heading[:at], heading[at + 1 :])) for at in (*blanks, len(heading))]
+        lines.append(max(min(halves), _longest(cells)))
     parts = [_longest(word for text in texts for word in WORD.findall(text)) for texts in columns]
-    for least in (whole, lines, *([parts] if words else [])):
-        for gap in GAPS:
-            spare = room - sum(least) - gap * (len(columns) - 1)
-            if spare < 0:
-                continue
+    for least, gap in product((whole, lines, *([parts] if words else [])), GAPS):
+        spare = room - sum(least) - gap * (len(columns) - 1)
+        if spare >= 0:
             widths = list(least)
-            for wider in (lines, whole):
-                for at in (0, *range(len(widths) - 1, 0, -1)):
-                    more = max(min(wider[at] - widths[at], spare), 0)
-                    widths[at] += more
-                    spare -= more
+            for wider, at in product((lines, whole), (0, *range(len(widths) - 1, 0, -1))):
+                more = max(min(wider[at] - widths[at], spare), 0)
+                widths[at] += more
+                spare -= more
             return widths, gap
     return None
 
@@ -169,26 +149,20 @@ def _plain_text(cell: RenderableType) -> str:
     return cell.plain if isinstance(cell, Text) else str(cell)
 
 
-def _halves(heading: str) -> Iterator[tuple[str, str]]:
-    """A heading on one line, and on two broken at each of its blanks."""
-    words = heading.split(" ")
-    return ((" ".join(words[:at]), " ".join(words[at:])) for at in range(1, len(words) + 1))
-
-
 def _longest(texts: Iterable[str]) -> int:
     """Characters of the longest line."""
     return max((cell_len(line) for text in texts for line in text.split("\n")), default=0)
 
 
-def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
-    """A table of numbers, flush right under their headings, but for the first column and those
-    named ``text``.
+def _columns(names: Iterable[tuple[str, bool]]) -> FittedColumns:
+    """A table without rows, of columns by their headings; all but the first one and those of texts
+    are flush right.
     """
     table = FittedColumns(box=None, pad_edge=False, header_style="bold")
-    for index, name in enumerate(names):
-        justify: JustifyMethod = "left" if index == 0 or name in text else "right"
+    for index, (name, is_text) in enumerate(names):
+        justify: JustifyMethod = "left" if index == 0 or is_text else "right"
         table.add_column(name, justify=justify, overflow="fold")
-    table.ranks = (0,) * len(names)
+    table.ranks = (0,) * len(table.columns)
     return table
 
 
@@ -220,17 +194,12 @@ def angle_of(path: str) -> Callable[[Any], float | None]:
     return value
 
 
-def _named_value(name: str) -> tuple[str, Callable[[Any], Any]]:
-    key, _, path = name.partition("=")
-    path = path or UNIT.sub("", key)
-    return key, angle_of(path) if key.endswith("_deg") else lambda row: value_at(row, path)
-
-
-def values_of(source: Any, *names: str) -> dict[str, Any]:
-    """Values for JSON by their names: ``key`` of an attribute and its unit, or ``key=path``; angles
-    are degrees.
+def values_of(source: Any, *columns: str | Column) -> dict[str, Any]:
+    """Values for JSON by their keys: of columns, or of ``key`` for an attribute and its unit, or
+    ``key=path``; angles are degrees.
     """
-    return {key: _plain(value(source)) for key, value in map(_named_value, names)}
+    every = (Column.named(each, "", "") if isinstance(each, str) else each for each in columns)
+    return {column.key.replace("#", ""): _plain(column.value(source)) for column in every}
 
 
 def file_columns(where: str, *names: str) -> list[Column]:
@@ -278,7 +247,9 @@ class Column(NamedTuple):
         **more: Any,
     ) -> Column:
         """Column whose key and value are those of `values_of` by a ``name``."""
-        key, value = _named_value(name)
+        key, _, path = name.partition("=")
+        path = path or UNIT.sub("", key)
+        value = angle_of(path) if key.endswith("_deg") else lambda row: value_at(row, path)
         return cls(key, heading, unit, value, text, where, **more)
 
     def shown(self, row: Any) -> str:
@@ -344,41 +315,32 @@ class DataTable:
         shown = self.at(place)
         return tuple(tuple(column.shown(row) for column in shown) for row in self.rows)
 
-    def screen(self, place: str, *, between: str = " ", first: int | None = None) -> FittedColumns:
-        """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones
-        and the last.
-        """
+    def screen(self, place: str, *, first: int | None = None) -> FittedColumns:
+        """A table of a screen; of many rows the ``first`` ones and the last."""
         shown = self.at(place)
-        headed = [(column.headed(between), column) for column in shown]
-        text = tuple(name for name, column in headed if column.kind == TEXT)
-        table = columns(*(name for name, _ in headed), text=text)
+        table = _columns((column.headed(" "), column.kind == TEXT) for column in shown)
         table.ranks = tuple(column.rank for column in shown)
         last = len(self.rows) - 1
         cut = last if first is None or last < first + 2 else first
         for index, row in enumerate(self.rows):
             if index < cut or index == last:
-                table.add_row(
-                    *(self._cell(column, row, index, at == 0) for at, column in enumerate(shown))
-                )
+                cells = [_cell(column, row) for column in shown]
+                if index == self.mark:
+                    cells[0].style = "bold"
+                table.add_row(*cells)
             elif index == cut:
                 table.add_row(f"… {last - cut} more")
         return table
 
-    def _cell(self, column: Column, row: Any, index: int, first: bool) -> Text:
-        met = None if column.met is None else column.met(row)
-        return Text(column.shown(row), "bold" if first and index == self.mark else COLOURS[met])
-
-    def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
-        """Quantities down and rows across, named by the first column; ``corner``: heading,
-        ``names``: their style.
-        """
+    def transposed(self, place: str, corner: str = "") -> FittedColumns:
+        """Quantities down and rows across, named by the first column; ``corner``: heading."""
         name, *shown = self.at(place)
-        table = columns(corner, *map(name.shown, self.rows))
+        table = _columns((head, False) for head in (corner, *map(name.shown, self.rows)))
+        if self.mark is not None:
+            table.ranks = (0, *(int(index != self.mark) for index in range(len(self.rows))))
         for column in shown:
-            cells = (
-                self._cell(column, row, index, first=False) for index, row in enumerate(self.rows)
-            )
-            table.add_row(Text(column.headed(", "), style=names), *cells)
+            cells = (_cell(column, row) for row in self.rows)
+            table.add_row(Text(column.headed(", "), style="dim"), *cells)
         return table
 
     def array(self) -> NDArray[np.void]:
@@ -404,20 +366,16 @@ class DataTable:
     def json(self, place: str = "json") -> list[dict[str, Any]]:
         """A dict a row; vectors are lists, unknown values None."""
         shown = self.at(place)
-        return [
-            {column.key.replace("#", ""): _plain(column.value(row)) for column in shown}
-            for row in self.rows
-        ]
+        return [values_of(row, *shown) for row in self.rows]
 
     def _fields(self) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
         """Names, kinds and rows of the file, a vector in three columns."""
+        names, kinds = list[str](), list[str]()
         shown = self.at("csv")
-        names = [name for column in shown for name in _names(column)]
-        kinds = [
-            TEXT if column.kind == YES_NO else column.kind
-            for column in shown
-            for _ in _names(column)
-        ]
+        for column in shown:
+            axes = ("_1", "_2", "_3") if "#" in column.key else ("",)
+            names += [column.key.replace("#", axis) for axis in axes]
+            kinds += [TEXT if column.kind == YES_NO else column.kind for _ in axes]
         return (
             names,
             kinds,
@@ -425,12 +383,8 @@ class DataTable:
         )
 
 
-def _names(column: Column) -> list[str]:
-    return (
-        [column.key.replace("#", f"_{axis}") for axis in (1, 2, 3)]
-        if "#" in column.key
-        else [column.key]
-    )
+def _cell(column: Column, row: Any) -> Text:
+    return Text(column.shown(row), COLOURS[None if column.met is None else column.met(row)])
 
 
 def _parts(column: Column, row: Any) -> list[Any]:

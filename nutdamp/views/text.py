@@ -292,18 +292,17 @@ def screen_line(note: Note) -> Text:
     )
 
 
-_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
-_file: ContextVar[str] = ContextVar("file", default="")
+_screens: ContextVar[tuple[bool, str]] = ContextVar("screens", default=(False, ""))
 
 
 def quiet() -> bool:
     """True where screens leave out notes and next steps, and warnings stay."""
-    return _quiet.get()
+    return _screens.get()[0]
 
 
 def with_file(step: str) -> str:
     """A next step, with the spacecraft file of the command line if it is a command."""
-    return f"{step} {_file.get()}".rstrip() if step.startswith("nutdamp ") else step
+    return f"{step} {_screens.get()[1]}".rstrip() if step.startswith("nutdamp ") else step
 
 
 @contextmanager
@@ -311,12 +310,11 @@ def screens_of(file: str, *, hidden: bool) -> Iterator[None]:
     """Context in which screens are `quiet`, if notes are to be ``hidden``, and next steps have the
     ``file`` of the spacecraft.
     """
-    tokens = _quiet.set(hidden), _file.set(file)
+    token = _screens.set((hidden, file))
     try:
         yield
     finally:
-        _quiet.reset(tokens[0])
-        _file.reset(tokens[1])
+        _screens.reset(token)
 
 
 def ordered(notes: Iterable[Note]) -> list[Note]:

@@ -26,7 +26,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.decisions import derived_table, heading, plan_json
-from nutdamp.views.parts import named, pulse_table, requested, summary
+from nutdamp.views.parts import Summary, named, pulse_table, requested
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,
@@ -190,50 +190,56 @@ def trade_screen(traded: Trade, *, verbose: bool) -> RenderableType:
         head.append(Text.assemble(("Requirement ", "bold"), f"({required}) ", words))
     if verbose:
         more = [derived_table(spacecraft), *front_parts(spacecraft, fronts)]
-        return summary(head, None, (), "", more=more, verbose=True)
+        return Summary(head, lambda: more, verbose=True)
     notes = missing(spacecraft, fronts)
     if points and spacecraft.commands is not None:
         notes.append(note("trade-not-commandable"))
-    rows = _shown_once(points)
+    # Of points with the same printed values, but for the number, the first; evenly some of more.
+    printed = [cells[1:] for cells in _table(points).cells("brief")]
+    rows = [row for at, row in enumerate(points) if printed[at] not in printed[:at]]
+    evenly = np.linspace(0, len(rows) - 1, min(ROWS, len(rows)))
+    rows = [rows[round(at)] for at in evenly.tolist()]
     if len(rows) < len(points):
         notes.append(note("trade-points", shown=len(rows), count=len(points)))
-    return summary(
+    return Summary(
         head,
-        (lambda **_: _table(rows).screen("brief")) if points else None,
+        lambda **_: [_table(rows).screen("brief")] if points else [],
         [*notes, *_ends_off(fronts)],
         "--csv points.csv · --plot trade.png · --schedules FOLDER",
     )
 
 
-def _shown_once(points: Sequence[TradeRow]) -> list[TradeRow]:
-    """The points of a screen: of those with the same printed values the first, and evenly some of
-    more than `ROWS`.
-    """
-    printed = [cells[1:] for cells in _table(points).cells("brief")]  # without the number
-    rows = [row for at, row in enumerate(points) if printed[at] not in printed[:at]]
-    evenly = np.linspace(0, len(rows) - 1, min(ROWS, len(rows)))
-    return [rows[round(at)] for at in evenly.tolist()]
-
-
 def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
     """The table of each front under its name, and notes on all."""
     parts: list[RenderableType] = []
-    for front in fronts:
-        name = front_name(front, pointing=spacecraft.goal.axis is not None)
-        lines: list[RenderableType] = [Text(name, style="bold")]
-        if front.why is not None:
-            lines.append(Text(_without_optimal(front)))
-        if front.points:
-            rows = [row for row in rows_of(fronts) if row.front is front]
-            lines.append(_table(rows).screen("full"))
+    for name, reason, table in front_tables(spacecraft, fronts):
+        lines: list[RenderableType] = [Text(name, style="bold"), *map(Text, reason)]
+        if table.rows:
+            lines.append(table.screen("full"))
         parts.append(Group(*lines))
+    return [*parts, *(Text(sentence, style="dim") for sentence in front_notes(fronts))]
+
+
+def front_tables(
+    spacecraft: Spacecraft, fronts: Sequence[Front]
+) -> Iterator[tuple[str, list[str], DataTable]]:
+    """Name of each front, the reason that optimal gives no schedule, if it gives none, and its
+    table.
+    """
+    for front in fronts:
+        reason = [] if front.why is None else [_without_optimal(front)]
+        rows = [row for row in rows_of(fronts) if row.front is front]
+        yield front_name(front, pointing=spacecraft.goal.axis is not None), reason, _table(rows)
+
+
+def front_notes(fronts: Sequence[Front]) -> tuple[str, ...]:
+    """Sentences on the tables of all fronts."""
     priced = [(row.spent(row.point.cost), row.spent(row.bound)) for row in rows_of(fronts)
               if row.bound is not None and row.point.cost < row.bound]  # fmt: skip
     # As the table writes both.
     differ = any(spent != bound for spent, bound in priced)
     below = [note("trade-below-bound")] if differ else []
-    told = sentences((*below, *_ends_off(fronts)))
-    return [*parts, *(Text(sentence, style="dim") for sentence in told)]
+    return sentences((*below, *_ends_off(fronts)))
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[Note]:

@@ -24,6 +24,7 @@ from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.notes import verdict_notes
 from nutdamp.schemes.block_model import BlockModel, fired
+from nutdamp.spacecraft import directions
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -141,7 +142,7 @@ def test_campaigns_of_ace_end_as_reported(date: str, side: float) -> None:
     """
     one = CAMPAIGNS[date]
     body = at_rest("ace", 0.5 * (one.before + one.after))
-    body = replace(body, sun=body.direction_in_n(math.radians(one.sun[0]), 0.3))
+    body = replace(body, sun=directions.direction_in_n(body, math.radians(one.sun[0]), 0.3))
     model = BlockModel(body)
     thruster = next(channel for channel in body.channels if channel.name == "P1")
     step = float(model.turned_by(thruster, WIDTH, body.spin))
@@ -170,7 +171,7 @@ def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
     """
     one = CAMPAIGNS[date]
     body = at_rest("ace", one.before)
-    body = replace(body, sun=body.direction_in_n(math.radians(one.sun[0]), 0.3))
+    body = replace(body, sun=directions.direction_in_n(body, math.radians(one.sun[0]), 0.3))
     schedule = fired(body, (Block("P1", 1, 5.0, WIDTH, one.pulses),))
     plan = planning.Plan(body, "command-block", schedule)
     values = one_of(verdict_notes(planning.judge(plan), plan), "spin-change")

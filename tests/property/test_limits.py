@@ -42,7 +42,6 @@ from nutdamp.planning.notes import comparison_warnings, plan_notes
 from nutdamp.planning.plan import Plan, Standing
 from nutdamp.planning.screening import FlownPlan
 from nutdamp.planning.verdict import Cases, Status
-from nutdamp.schemes import pulse_pairs
 from nutdamp.schemes.catalogue import CLASSIC, LEAST, Options
 from nutdamp.schemes.sequential import MOST_PULSES, ImpulseBuilder
 from nutdamp.spacecraft.constraints import Windows
@@ -419,18 +418,6 @@ def test_windows_that_end_beside_a_tick_are_left_behind(
     with within(20_000):
         start = windows.earliest_start(0.5 * tick, ready)
     assert windows.allows(present(start), 0.5 * tick, ready)
-
-
-def test_a_search_that_gains_a_little_in_every_step_ends() -> None:
-    steps = itertools.count()
-
-    def cost(points: np.ndarray) -> np.ndarray:
-        next(steps)
-        return np.asarray(1.0 / (1.0 + np.exp(np.minimum(1e-9 * points[:, 0], 700.0))))
-
-    with within(PLENTY):
-        pulse_pairs._descend(cost, np.array([0.0]), np.array([1.0]))
-    assert next(steps) <= pulse_pairs.COMPASS_STEPS + 1
 
 
 @pytest.mark.weekly

@@ -21,6 +21,7 @@ from nutdamp.physics.thruster import Measured, Trapezoid
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, reasons
 from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft import directions
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
 from nutdamp.spacecraft.model import (
     Attitude,
@@ -72,7 +73,7 @@ def spinner(
 
 def aimed(spacecraft: Spacecraft, tilt: float, azimuth: float) -> Spacecraft:
     """With a target axis ``tilt`` degrees from H at t = 0 and ``azimuth`` degrees about it."""
-    axis = spacecraft.direction_in_n(math.radians(tilt), math.radians(azimuth))
+    axis = directions.direction_in_n(spacecraft, math.radians(tilt), math.radians(azimuth))
     return replace(spacecraft, goal=replace(spacecraft.goal, axis=axis))
 
 

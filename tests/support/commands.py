@@ -126,6 +126,26 @@ CRAFTS = {
     "craft_yaml": LOOPED,
     "seen_yaml": SEEN,
     "free_yaml": SEEN.replace("8 deg", "1 deg"),
+    "sunny_yaml": """
+name: Spinner
+inertia: {A: 80 kg m^2, C: 120 kg m^2}
+state: {spin: -30 rpm, nutation: 2 deg}
+attitude: {quaternion: [1, 0, 0, 0]}
+thrusters: [{name: T1, torque: [8, 0, 0], max_on_time: 900 ms}]
+sun: [40 deg, 20 deg]
+sun_sensor: {azimuth: 35 deg}
+commands: {delay_step: 2 ms, delay_max: 1.9 s, width: {step: 1 ms, min: 20 ms, max: 1.8 s},
+  every: [1, 2]}
+keep: [{name: pole, direction: [10 deg, 86 deg], min: 2 deg}]
+""",
+    "pointed_yaml": """
+name: Pointed
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+state: {spin: 3 rad/s, nutation: 6 deg}
+attitude: {quaternion: [0.809017, 0.081804, 0.582065, 0], epoch: 2016-12-31T23:59:59Z,
+  frame: EME2000}
+steerable: {torque: 60 N m}
+""",
     "stage_yaml": STAGE,
     "undispersed_yaml": STAGE.partition("dispersions:\n")[0],
     "unlooped_yaml": STAGE[: STAGE.index("\nloop:")] + "\n" + STAGE[STAGE.index("dispersions:") :],

@@ -15,9 +15,9 @@ from support.spinners import commanded
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo import propagated
-from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Thrusting, number_of, triple
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Thrusting
 from nutdamp.montecarlo.inputs import Draws
-from nutdamp.physics import attitude, series
+from nutdamp.physics import attitude, motion
 from nutdamp.physics.thruster import Ramp
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block
@@ -93,19 +93,13 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
     """The ``cases`` with starts and impulses by their own Sun pulses, else as they are."""
     if not model.schedule.blocks:
         return cases
-    count = number_of(cases)
     dynamics = make_dynamics(model.spacecraft)
-    moments, rates = (
-        np.array([np.broadcast_to(part, count) for part in of])
-        for of in (cases.moments, cases.omega0)
-    )
-    upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
-    bodies = series.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
+    upright = np.tile([[1.0], [0.0], [0.0], [0.0]], cases.count)
+    forcing = dynamics.forcing._replace(wheel=cases.wheel)
+    bodies = motion.Bodies(cases.moments, dynamics.constant, forcing)
     nominal = propagated.RealWidths(model).seen_nominally
-    _, _, starts, fires, _ = propagated.fly(model, bodies, rates, upright, cases, nominal)
-    pulses = zip(cases.impulses, fires, strict=True)
-    impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
-    return replace(cases, starts=tuple(starts), impulses=impulses)
+    _, starts, fires = propagated.fly(model, bodies, upright, cases, nominal)
+    return replace(cases, starts=starts, impulses=cases.impulses * fires[:, None])
 
 
 def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]:
@@ -113,17 +107,16 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
     body = model.spacecraft
     case = timed(model, model.cases(draws))
     pulses = []
-    spent = case.spent or (None,) * len(case.starts)
+    spent = (None,) * len(case.starts) if case.spent is None else case.spent
     for number, (planned, used) in enumerate(zip(model.schedule, spent, strict=True)):
-        width, start = case.widths[number], case.starts[number]
-        impulse = np.array(case.impulses[number], dtype=float).reshape(3)
+        start = float(case.starts[number, 0])
+        impulse = case.impulses[number, :, 0]
         torque = None if planned.on_time == 0.0 else impulse / planned.on_time
         propellant = None if used is None else float(np.squeeze(used))
-        t = float(np.squeeze(start + 0.5 * width))
+        t = planned.t + start - planned.loaded[0]
         if case.thrust[number]:
-            begin = float(np.squeeze(start - case.leads[number]))
             pulses += [
-                _thrusting(planned, begin, one, propellant, len(case.thrust[number]))
+                _thrusting(planned, start, one, propellant, len(case.thrust[number]))
                 for one in case.thrust[number]
             ]
         elif planned.command is not None:
@@ -133,17 +126,17 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
             pulses.append(
                 Pulse(t, planned.on_time, planned.channel, impulse, torque, propellant=propellant)
             )
-    tilt = np.array([*case.tilt, 0.0], dtype=float)
+    tilt = np.array([*case.tilt[:, 0], 0.0])
     angle = float(np.linalg.norm(tilt))
     turn = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * tilt)])
     axes = body.inertia.axes
     quaternion = attitude.multiply(
         attitude.multiply(body.initial.quaternion, turn), attitude.from_matrix(axes.T)
     )
-    first, second, third = (float(np.squeeze(moment)) for moment in case.moments)
+    first, second, third = case.moments[:, 0].tolist()
     per_kg = None
     if case.per_kg is not None:
-        one, two, three = (float(np.squeeze(part)) for part in case.per_kg)
+        one, two, three = case.per_kg[:, 0].tolist()
         per_kg = one, two, three
     own = np.eye(3) if case.turn is None else case.turn[:, :, 0]
     true = replace(
@@ -154,7 +147,7 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
             wheel=float(np.squeeze(case.wheel)),
             axes=axes @ own,
         ),
-        omega0=np.array(case.omega0, dtype=float).reshape(3),
+        omega0=case.omega0[:, 0],
         attitude=Attitude(quaternion),
         tank=None if body.tank is None else replace(body.tank, inertia_per_kg=per_kg),
     )
@@ -227,6 +220,6 @@ def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
             left.momentum_shift,
             float(attitude.angle_between(momentum, target)),
             settled.spin - true.spin,
-            np.nan if propellant is None else float(propellant),
+            np.nan if propellant is None else float(propellant[0]),
         ]
     )

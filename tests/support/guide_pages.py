@@ -49,7 +49,7 @@ class KeyGuide(NamedTuple):
             default = "required"
         elif "default" not in self.field.description.casefold():
             default = "optional" if value is None or value == [] else f"default {value:g}"
-        facts = [unit, default, "" if example is None else f"example: `{flow(example)}`"]
+        facts = [unit, default, "" if example is None else f"example: `{example}`"]
         told = "; ".join(filter(None, facts))
         return f"{self.field.description} {told[:1].upper()}{told[1:]}"
 
@@ -67,21 +67,12 @@ def keys(model: fields.ValueKind = SPACECRAFT, prefix: str = "") -> Iterator[Key
             yield from keys(section, f"{prefix}{name}.")
 
 
-def flow(value: object) -> str:
-    """A value as YAML on one line."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {flow(held)}" for key, held in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(flow, value)) + "]"
-    return str(value)
-
-
 def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[str]:
     """The keys below ``key``, section by section; those of tolerances, all alike, once."""
     if key.section is None:
         return
     children = [entry for entry in every if entry.parent == key.path]
-    about = key.section.definition["description"]
+    about = key.section.about
     yield f"## {key.path}\n\n{about}\n\n{_listed(children)}"
     below = [child for child in children if child.section is not None]
     if below and all(present(child.section).form for child in below):

@@ -184,10 +184,7 @@ def unpictured() -> Iterator[None]:
     with patch.multiple(
         report,
         moving_of=one,
-        flight_picture=one,
-        acceptance_picture=one,
-        trade_picture=one,
-        dispersion_picture=one,
+        picture=one,
     ):
         yield
 

@@ -1,19 +1,15 @@
 """An integrator for the tests that shares no formula and no line with nutdamp.
 
-Euler's equations and the rotation matrix R (body -> inertial) of a rigid body,
+Momentum in space, which only torques change, and the rotation matrix R (body -> inertial),
 
-    I dω/dt = M - ω × (I ω),      dR/dt = R [ω]×,
+    dH/dt = R M,      dR/dt = R [I⁻¹ RᵀH]×,
 
 from one edge of a pulse to the next by DOP853. Torques and impulses are fixed in the body. Angles
 are compared by the chord between unit vectors, which is exact at both ends of the scale.
 
-With energy dissipation it is H in space that is integrated, where dissipation cannot change it, and
-the attitude:
-
-    dH/dt = R M,      dR/dt = R [I⁻¹ RᵀH + s]×,
-
-s the turn of axis 3 away from H at κ sin θ cos θ; with a wheel at κ sin θ D(θ)/D(0), D dE/dθ over
-|H| sin θ. No torque of dissipation stands in these equations.
+With energy dissipation the attitude turns besides by s, axis 3 away from H at κ sin θ cos θ; with a
+wheel at κ sin θ D(θ)/D(0), D dE/dθ over |H| sin θ. No torque of dissipation stands in these
+equations.
 
 A ``wheel`` adds its constant momentum h e3 to I ω, wherever H stands.
 """
@@ -154,7 +150,7 @@ def through_valve(
     ]
 
 
-def _turning(rotation: Sequence[float], p: float, q: float, r: float) -> list[float]:
+def rotation_rates(rotation: Sequence[float], p: float, q: float, r: float) -> list[float]:
     """R [ω]× row by row, (9,) 1/s."""
     a, b, c, d, e, f, g, h, i = rotation
     return [
@@ -171,91 +167,51 @@ def coast(
     times: Array,
     growing: Array | None = None,
     wheel: float = 0.0,
+    growth: float = 0.0,
 ) -> list[Motion]:
-    """The motion at ``times`` (n,) s > 0 under a body torque, ``growing`` by (3,) N m/s."""
+    """The motion at ``times`` (n,) s > 0 under a body torque, ``growing`` by (3,) N m/s.
+
+    A small nutation grows at the rate ``growth`` κ, 1/s.
+    """
     A, B, C = (float(one) for one in moments)
-    m1, m2, m3 = (float(one) for one in torque)
-    g1, g2, g3 = (0.0, 0.0, 0.0) if growing is None else (float(one) for one in growing)
-
-    def slope(t: float, y: Array) -> list[float]:
-        p, q, r, *rotation = y.tolist()  # component by component: quicker than small arrays
-        return [
-            (m1 + g1 * t - (C - B) * q * r - q * wheel) / A,
-            (m2 + g2 * t - (A - C) * r * p + p * wheel) / B,
-            (m3 + g3 * t - (B - A) * p * q) / C,
-            *_turning(rotation, p, q, r),
-        ]
-
-    y0 = np.concatenate([motion.rates, motion.rotation.ravel()])
-    scale = max(float(np.linalg.norm(motion.rates)), 1e-3)
-    solution = solve_ivp(
-        slope,
-        (0.0, float(times[-1])),
-        y0,
-        method="DOP853",
-        t_eval=times,
-        rtol=RTOL,
-        atol=np.array([RTOL * scale * 1e-2] * 3 + [RTOL] * 9),
-    )
-    assert solution.success
-    return [Motion(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
-
-
-def sinking(
-    moments: Sequence[float],
-    motion: Motion,
-    torque: Array,
-    times: Array,
-    growth: float,
-    wheel: float = 0.0,
-) -> list[Motion]:
-    """`coast` of a body whose small nutation grows at the rate ``growth`` κ, 1/s."""
-    A, B, C = (float(one) for one in moments)
-    x, y_, z = (float(one) for one in torque)
+    x, y, z = (float(one) for one in torque)
+    gx, gy, gz = (0.0, 0.0, 0.0) if growing is None else (float(one) for one in growing)
     sense = math.copysign(1.0, C * float(motion.rates[2]) + wheel)
 
     def pace(size: float, cosine: float) -> float:
         """dE/dθ / (|H| sin θ) of E = H² sin²θ/(2A) + (H cos θ - h)²/(2C)."""
         return size * cosine * 2.0 / (A + B) - (size * cosine - wheel) / C
 
-    def slope(_: float, y: Array) -> list[float]:
-        hx, hy, hz, a, b, c, d, e, f, g, h, i = y.tolist()
-        size = math.sqrt(hx * hx + hy * hy + hz * hz)
-        u1, u2, u3 = (
-            (a * hx + d * hy + g * hz),
-            (b * hx + e * hy + h * hz),
-            (c * hx + f * hy + i * hz),
-        )
-        # s = κ (u·e3) (u × e3), u the direction of H in the body.
-        sinks = (
-            growth
-            * (sense * pace(size, u3 / size) / pace(size, sense) if wheel else u3 / size)
-            / size
-        )
-        p = u1 / A + sinks * u2
-        q = u2 / B - sinks * u1
-        r = (u3 - wheel) / C
-        rates = [a * x + b * y_ + c * z, d * x + e * y_ + f * z, g * x + h * y_ + i * z]
-        return [*rates, *_turning([a, b, c, d, e, f, g, h, i], p, q, r)]
+    def slope(t: float, state: Array) -> list[float]:
+        # Component by component: quicker than small arrays.
+        hx, hy, hz, a, b, c, d, e, f, g, h, i = state.tolist()
+        # H in the body.
+        u, v, w = a * hx + d * hy + g * hz, b * hx + e * hy + h * hz, c * hx + f * hy + i * hz
+        sinks = 0.0
+        if growth:  # s = κ (u·e3) (u × e3), u the direction of H in the body
+            size = math.sqrt(hx * hx + hy * hy + hz * hz)
+            cosine = sense * pace(size, w / size) / pace(size, sense) if wheel else w / size
+            sinks = growth * cosine / size
+        p, q, r = u / A + sinks * v, v / B - sinks * u, (w - wheel) / C
+        mx, my, mz = x + gx * t, y + gy * t, z + gz * t
+        pushes = [a * mx + b * my + c * mz, d * mx + e * my + f * mz, g * mx + h * my + i * mz]
+        return [*pushes, *rotation_rates([a, b, c, d, e, f, g, h, i], p, q, r)]
 
-    h0 = momentum(moments, motion, wheel)
-    y0 = np.concatenate([h0, motion.rotation.ravel()])
-    atol = np.array([RTOL * float(np.linalg.norm(h0))] * 3 + [RTOL] * 9)
+    start = momentum(moments, motion, wheel)
+    size = max(float(np.linalg.norm(start)), 1e-3 * C)
     solution = solve_ivp(
         slope,
         (0.0, float(times[-1])),
-        y0,
+        np.concatenate([start, motion.rotation.ravel()]),
         method="DOP853",
         t_eval=times,
         rtol=RTOL,
-        atol=0.1 * atol,
+        atol=0.01 * RTOL * np.array([size] * 3 + [1.0] * 9),
     )
     assert solution.success
-    found = [(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
+    ends = [(state[:3], state[3:].reshape(3, 3)) for state in solution.y.T]
     inner = vector(0, 0, wheel)
-    return [
-        Motion((rotation.T @ h - inner) / np.asarray(moments), rotation) for h, rotation in found
-    ]
+    return [Motion((turn.T @ h - inner) / np.asarray(moments), turn) for h, turn in ends]
 
 
 def path(
@@ -282,11 +238,7 @@ def path(
             growing = sum(((e.last - e.first) / (e.end - e.start) for e in swelling), np.zeros(3))
             torque = torque + sum((e.at(now) for e in swelling), np.zeros(3))
             spans = np.append(asked[(asked > now) & (asked < edge)], edge) - now
-            *inside, motion = (
-                sinking(moments, motion, torque, spans, growth, wheel)
-                if growth
-                else coast(moments, motion, torque, spans, growing, wheel)
-            )
+            *inside, motion = coast(moments, motion, torque, spans, growing, wheel, growth)
             found += inside
             now = edge
         for event in events:

@@ -1,22 +1,22 @@
 """Independent searches for cheap schedules, each on a motion of its own."""
 
 import math
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import Bounds, linprog, minimize
 from support.reference import frame_n
 
+from nutdamp.spacecraft import directions
 from nutdamp.spacecraft.equipment import Channel, Thruster
 from nutdamp.spacecraft.model import Goal, Inertia, Limits, Spacecraft
-from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 # --- an independent search for cheap schedules of strong thrusters: SLSQP from many random
-# starts, on its own motion. Nothing of nutdamp's planning is used. The motion is that of exact
-# torque-free arcs, R(t) = Rot(H t/A) R Rot3(aω3 t), between kicks; a pulse of real width is a few
-# kicks, evenly spread over it
+# starts, on its own motion. Nothing of nutdamp's planning is used
 
 Array = NDArray[np.float64]
 
@@ -69,79 +69,98 @@ class Rival(NamedTuple):
 
 
 def cheapest(spacecraft: Spacecraft, free_axis: bool, starts: int, seed: int = 0) -> Rival | None:
-    """The cheapest schedule found from ``starts`` random starts; None where none was found."""
+    """The cheapest schedule found from ``starts`` random starts; None where none was found.
+
+    Two to five pulses of random channels at random moments, one to three where H is free.
+    """
     rng = np.random.default_rng([11, seed])
     best: Rival | None = None
     for _ in range(starts):
-        found = _descended(spacecraft, free_axis, rng)
-        if found is not None and (best is None or found.cost < best.cost):
-            best = found
+        count = int(rng.integers(1 if free_axis else 2, 4 if free_axis else 6))
+        which = rng.integers(len(spacecraft.channels), size=count)
+        strength = np.array([spacecraft.channels[index].strength for index in which])
+        times = np.sort(rng.uniform(0, 1, count))
+        if rng.random() < 0.5:
+            times[0] = 0.0
+        if rng.random() < 0.5:
+            times[-1] = 1.0
+        ons = spacecraft.least_impulse / strength / count * rng.uniform(0.3, 2.0, count)
+        left = spacecraft.horizon - ons.sum()
+        if left > 0.0:
+            x = np.concatenate([times * left + np.cumsum(ons) - ons, ons])
+            found = _descended(spacecraft, which.tolist(), x, None if free_axis else 0.0)
+            if found is not None and (best is None or found.cost < best.cost):
+                best = found
     return best
 
 
-def _descended(body: Spacecraft, free_axis: bool, rng: np.random.Generator) -> Rival | None:
-    """SLSQP over starts and on-times of two to five pulses of random channels at random moments."""
-    horizon = body.horizon
-    count = int(rng.integers(1 if free_axis else 2, 4 if free_axis else 6))
-    which = rng.integers(len(body.channels), size=count)
+def _descended(body: Spacecraft, which: list[int], x: Array, off: float | None) -> Rival | None:
+    """The cheapest near x (2n,), starts and on-times in s of pulses one after the other, by SLSQP.
+
+    It leaves nothing by `ended` but H ``off`` rad beside its target, None: wherever it may be; None
+    where none is found.
+    """
+    count = len(which)
     torques = np.array([body.channels[index].torque for index in which])
     flows = np.array([body.channels[index].mass_flow for index in which], dtype=float)
-    longest = body.least_impulse / np.linalg.norm(torques, axis=1)
-    times = np.sort(rng.uniform(0, 1, count))
-    if rng.random() < 0.5:
-        times[0] = 0.0
-    if rng.random() < 0.5:
-        times[-1] = 1.0
-    ons = longest / count * rng.uniform(0.3, 2.0, count)
-    gaps = np.diff(np.concatenate([[0.0], times, [1.0]]))
-    left = horizon - ons.sum()
-    if left <= 0.0:
-        return None
-    begins = np.cumsum(gaps[:-1]) * left + np.concatenate([[0.0], np.cumsum(ons)[:-1]])
-    unit = np.concatenate([np.full(count, 1.0 / abs(body.spin)), longest])
-    price = np.concatenate([np.zeros(count), flows * longest]) / float(np.max(flows * longest))
+    unit = np.repeat([1.0 / abs(body.spin), float(x[count:].sum()) / count], count)
+    price = np.append(np.zeros(count), flows) * unit / float(flows @ x[count:])
     # start - end of the one before >= 0, and the horizon
     order = np.zeros((count + 1, 2 * count))
     for index in range(count):
         order[index, index] = 1.0
-        if index:
-            order[index, index - 1] = order[index, count + index - 1] = -1.0
-    order[count, count - 1] = order[count, -1] = -1.0
-    level = np.zeros(count + 1)
-    level[count] = -horizon
-    apart = order * unit / horizon
+        order[index + 1, index] = order[index + 1, count + index] = -1.0
+    level = np.append(np.zeros(count), -body.horizon)
+    apart = order * unit / body.horizon
 
     def left_over(x: Array) -> Array:
-        return ends(body, torques, np.atleast_2d(x) * unit, free_axis)
+        """What must be none, and what may be no less."""
+        fly = by_arcs if body.inertia.symmetric else ended
+        left = fly(body, torques, np.atleast_2d(x) * unit)
+        if off:
+            left[:, 2] = off**2 - np.sum(left[:, 2:] ** 2, axis=1)
+        return left[:, : 2 if off is None else 3 if off else 4]
 
     def slopes(x: Array) -> Array:
-        step = 1e-6
-        both = left_over(np.concatenate([x + step * np.eye(len(x)), x - step * np.eye(len(x))]))
-        return np.asarray((both[: len(x)] - both[len(x) :]).T / (2 * step))
+        step = 1e-6 * np.eye(len(x))
+        both = left_over(np.concatenate([x + step, x - step]))
+        return np.asarray((both[: len(x)] - both[len(x) :]).T / 2e-6)
 
-    met = {"type": "eq", "fun": lambda x: left_over(x)[0], "jac": slopes}
-    kept = {"type": "ineq", "fun": lambda x: apart @ x - level / horizon, "jac": lambda _: apart}
+    met = slice(2 if off else None)
+    constraints = [
+        {
+            "type": "eq",
+            "fun": lambda x: left_over(x)[0, met],
+            "jac": lambda x: slopes(x)[met],
+        },
+        {"type": "ineq", "fun": lambda x: apart @ x - level / body.horizon, "jac": lambda _: apart},
+    ]
+    if off:
+        inside = {"type": "ineq", "fun": lambda x: left_over(x)[0, 2:] / off}
+        constraints.append({**inside, "jac": lambda x: slopes(x)[2:] / off})
     found = cast("Any", minimize)(
         lambda x: float(price @ x),
-        np.concatenate([begins, ons]) / unit,
+        x / unit,
         jac=lambda _: price,
         method="SLSQP",
         bounds=Bounds(np.zeros(2 * count), np.full(2 * count, np.inf)),
-        constraints=[met, kept],
+        constraints=constraints,
         options={"maxiter": 80, "ftol": 1e-9},
     )
     x = np.asarray(found.x) * unit
-    if not np.isfinite(x).all() or np.abs(left_over(found.x)).max() > MET:
+    if not np.isfinite(x).all() or np.abs(left_over(found.x)[:, met]).max() > MET:
         return None
-    if (order @ x - level).min() < -1e-9 * horizon or x[count:].min() < -1e-12:
+    if off and np.hypot(*ended(body, torques, x[None])[0, 2:]) > off + MET:
+        return None
+    if (order @ x - level).min() < -1e-9 * body.horizon or x[count:].min() < -1e-12:
         return None
     names = [body.channels[index].name for index in which]
     pulses = [(name, float(x[i]), float(x[count + i])) for i, name in enumerate(names)]
     return Rival(float(flows @ x[count:]), pulses)
 
 
-def ends(body: Spacecraft, torques: Array, x: Array, free_axis: bool) -> Array:
-    """Transverse momentum and shift of H, over |H|, after x (k, 2n), starts and on-times in s."""
+def by_arcs(body: Spacecraft, torques: Array, x: Array) -> Array:
+    """`ended` of a symmetric body that keeps H, by exact arcs between a few kicks in each pulse."""
     A, _, C = body.inertia.moments
     count = len(torques)
     rotation = np.tile(frame_n(body.inertia.moments, body.omega0), (len(x), 1, 1))
@@ -160,7 +179,7 @@ def ends(body: Spacecraft, torques: Array, x: Array, free_axis: bool) -> Array:
     moved = np.einsum("kij,kj->ki", rotation, rates * [A, A, C]) / size
     off = np.column_stack([A * rates[:, :2] / size, moved[:, :2]])
     off[moved[:, 2] < 0.0, 2:] += 1.0  # H the other way round is no solution
-    return np.asarray(off[:, :2] if free_axis else off)
+    return off
 
 
 def _coasted(A: float, C: float, rotation: Array, rates: Array, time: Array) -> tuple[Array, Array]:
@@ -189,12 +208,13 @@ def _coasted(A: float, C: float, rotation: Array, rates: Array, time: Array) -> 
 # an own integrator. Nothing of nutdamp's planning is used. The program has on-times in cells of a
 # grid; in it H in the body follows the linear Euler equations about pure spin, by the exponential
 # of their matrix, and H in space gets the torque turned by ω3 t. Its burns are taken down on the
-# true motion by linear programs, by fourth-order Runge-Kutta steps
+# true motion
 
-CELL, STRIDE = 0.02, 0.12
-"""rad of spin in a cell of the program, and in a step of the integrator."""
+CELL = 0.02
+"""rad of spin in a cell of the program."""
 
-ROUNDS, MOST = 16, 16  # programs about one flight after the other; burns at most
+MOST = 16
+"""Burns at most."""
 
 AROUND = np.array([part(2 * math.pi / 64 * np.arange(64)) for part in (np.cos, np.sin)])
 
@@ -242,8 +262,8 @@ def unequal_body(seed: int) -> tuple[Spacecraft, float]:
         limits=limits,
     )
     if rng.random() < 0.5:
-        axis = body.direction_in_n(
-            math.radians(rng.uniform(0.05, 1.0)), rng.uniform(0, 2 * math.pi)
+        axis = directions.direction_in_n(
+            body, math.radians(rng.uniform(0.05, 1.0)), rng.uniform(0, 2 * math.pi)
         )
         body = Spacecraft(
             body.name, body.inertia, omega, channels=tuple(made), limits=limits, goal=Goal(axis)
@@ -252,10 +272,12 @@ def unequal_body(seed: int) -> tuple[Spacecraft, float]:
 
 
 class Descended(NamedTuple):
-    """Least ``program`` cost of small angles, kg, and the schedule ``flown``, None without one."""
+    """Least ``program`` cost of small angles, kg, and that of a schedule ``flown``, None without
+    one.
+    """
 
     program: float
-    flown: Schedule | None
+    flown: float | None
 
 
 def rival(body: Spacecraft, off: float) -> Descended:
@@ -297,7 +319,11 @@ def rival(body: Spacecraft, off: float) -> Descended:
     burns = sorted(
         burn for index, share in enumerate(shares.T) for burn in _burns(index, share, width)
     )
-    return Descended(float(found.fun), _flown(body, off, burns))
+    near = None
+    if 0 < len(burns) <= MOST:
+        starts, ons, which = zip(*burns, strict=True)
+        near = _descended(body, list(which), np.array([*starts, *ons]), off)
+    return Descended(float(found.fun), None if near is None else near.cost)
 
 
 def _burns(index: int, share: Array, width: float) -> list[tuple[float, float, int]]:
@@ -312,108 +338,39 @@ def _burns(index: int, share: Array, width: float) -> list[tuple[float, float, i
     return made
 
 
-def _flown(body: Spacecraft, off: float, burns: list[tuple[float, float, int]]) -> Schedule | None:
-    """Schedule near the ``burns``, one after the other, that leaves nothing by `ended`; None where
-    none is found.
-
-    Linear programs about one flight after the other, in a region that shrinks, lower the cost.
-    """
-    which = [burn[2] for burn in burns]
-    count = len(burns)
-    if not 0 < count <= MOST:
-        return None
-    torques = np.array([body.channels[index].torque for index in which])
-    flows = np.array([body.channels[index].mass_flow for index in which], dtype=float)
-    unit = np.repeat(
-        [1.0 / abs(float(body.omega0[2])), sum(burn[1] for burn in burns) / count], count
-    )
-    order = np.zeros((count + 1, 2 * count))
-    for index in range(count):
-        order[index, index] = 1.0
-        order[index + 1, index] = order[index + 1, count + index] = -1.0
-    level = np.append(np.zeros(count), -body.horizon)
-    ring = np.vstack([np.zeros((2, AROUND.shape[1])), math.sin(off) * AROUND])
-    x = np.array([*(burn[0] for burn in burns), *(burn[1] for burn in burns)])
-    price = np.append(np.zeros(count), flows) * unit / float(flows @ x[count:])
-    slack = np.hstack([np.eye(4), -np.eye(4)])
-    for region in 0.3 * 0.6 ** np.arange(ROUNDS):
-        there = ended(body, torques, np.vstack([x, x + 1e-6 * np.diag(unit)]))
-        slopes = (there[1:] - there[0]).T / 1e-6
-        moved = linprog(
-            np.concatenate([price, np.full(8, 1e4), np.zeros(ring.shape[1]), [1e4]]),
-            A_eq=np.hstack([slopes, slack, ring, np.zeros((4, 1))]),
-            b_eq=-there[0],
-            A_ub=np.vstack(
-                [
-                    np.hstack(
-                        [
-                            -order * unit,
-                            np.zeros((count + 1, 8 + ring.shape[1])),
-                            -np.ones((count + 1, 1)),
-                        ]
-                    ),
-                    np.concatenate([np.zeros(2 * count + 8), np.ones(ring.shape[1]), [0.0]]),
-                ]
-            ),
-            b_ub=np.append(order @ x - level, 1.0),
-            bounds=[
-                *((max(-region, least), region) for least in -x / unit),
-                *[(0.0, None)] * (9 + len(ring.T)),
-            ],
-        )
-        if moved.fun is None:
-            return None
-        x = x + np.asarray(moved.x)[: 2 * count] * unit
-    missed = ended(body, torques, x[None])[0]
-    if (
-        (order @ x - level).min() < -1e-9
-        or np.abs(missed[:2]).max() > MET
-        or np.hypot(*missed[2:]) > off + MET
-    ):
-        return None
-    starts, ons = np.split(x, 2)
-    pulses = zip(which, starts.tolist(), ons.tolist(), strict=True)
-    return Schedule(
-        tuple(channel_pulse(body.channels[i], t + 0.5 * on, on) for i, t, on in pulses if on > 1e-9)
-    )
-
-
 def ended(body: Spacecraft, torques: Array, x: Array) -> Array:
     """H across axis 3 and off its target, over |H|, after x (k, 2n), starts and on-times in s."""
     moments = np.array(body.inertia.moments)
     count = len(torques)
     size = float(np.linalg.norm(moments * body.omega0))
-    rates = np.tile(body.omega0, (len(x), 1))
-    rotation = np.tile(frame_n(body.inertia.moments, body.omega0), (len(x), 1, 1))
+    start = np.column_stack([body.omega0, frame_n(body.inertia.moments, body.omega0).T])
+    state = np.tile(start.T, (len(x), 1, 1))  # rates, and the rows of the rotation body -> inertial
 
-    def slope(rates: Array, rotation: Array, torque: Array) -> tuple[Array, Array]:
-        faster = (torque - np.cross(rates, moments * rates)) / moments
-        return faster, np.cross(rotation, rates[:, None, :])
+    def slope(torque: Array, time: Array, _: float, flat: Array) -> Array:
+        state = flat.reshape(len(x), 4, 3)
+        turned = state.copy()
+        turned[:, 0] *= moments
+        faster = np.cross(turned, state[:, :1])
+        faster[:, 0] = (faster[:, 0] + torque) / moments
+        return np.asarray((faster * time[:, None, None]).ravel())
 
     now = np.zeros(len(x))
     for index in range(2 * count):
         pulse, ending = divmod(index, 2)
         edge = x[:, pulse] + (x[:, count + pulse] if ending else 0.0)
         torque = torques[pulse] if ending else np.zeros(3)
-        steps = max(
-            math.ceil(
-                float(np.max(np.abs(edge - now))) * float(np.linalg.norm(body.omega0)) / STRIDE
-            ),
-            1,
+        turned = partial(slope, torque, edge - now)
+        solution = solve_ivp(
+            turned, (0.0, 1.0), state.ravel(), method="DOP853", rtol=1e-9, atol=1e-11
         )
-        step = ((edge - now) / steps)[:, None]
-        for _ in range(steps):
-            k1, r1 = slope(rates, rotation, torque)
-            k2, r2 = slope(rates + 0.5 * step * k1, rotation + 0.5 * step[:, None] * r1, torque)
-            k3, r3 = slope(rates + 0.5 * step * k2, rotation + 0.5 * step[:, None] * r2, torque)
-            k4, r4 = slope(rates + step * k3, rotation + step[:, None] * r3, torque)
-            rates = rates + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            rotation = rotation + step[:, None] / 6.0 * (r1 + 2.0 * r2 + 2.0 * r3 + r4)
+        state = solution.y[:, -1].reshape(len(x), 4, 3)
         now = edge
+    rates, rotation = state[:, 0], state[:, 1:]
     target = np.array([0.0, 0.0, 1.0]) if body.goal.axis is None else body.goal.axis
     first = np.cross(target, [0.3, 0.7, 0.2])
     first /= np.linalg.norm(first)
     moved = np.einsum("kij,kj->ki", rotation, moments * rates) / size
+    moved[moved @ target < 0.0] += 1.0  # H the other way round is no solution
     return np.column_stack(
         [moments[:2] * rates[:, :2] / size, moved @ first, moved @ np.cross(target, first)]
     )

@@ -9,12 +9,18 @@ import pytest
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.builders import pulse, spinner
-from support.reference import RTOL, Array, Motion, _turning
+from support.reference import RTOL, Array, Motion, rotation_rates
 
-from nutdamp.flight.dynamics import Arc
-from nutdamp.physics.motion import MOST_STEPS, MotionStretch, polynomials
-from nutdamp.physics.series import NOTHING, Bodies, Forcing, Polynomial
-from nutdamp.spacecraft.model import Spacecraft, SpinState
+from nutdamp.physics.motion import (
+    MOST_STEPS,
+    NOTHING,
+    Bodies,
+    Forcing,
+    MotionStretch,
+    Piece,
+    polynomials,
+)
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 
 # --- bodies and spins that tables of unit/physics run over, and motion under changing torques
@@ -42,7 +48,7 @@ def series(
     end: float,
     forcing: Forcing = NOTHING,
     most: int = MOST_STEPS,
-) -> list[Polynomial]:
+) -> list[Piece]:
     """Motion of one body from ``begin`` to ``end`` s."""
     body = Bodies(np.array(moments), np.asarray(torque, dtype=float), forcing)
     start = MotionStretch(body, begin, rates, quaternion)
@@ -61,11 +67,12 @@ def arc(
     sense: float = 1.0,
 ) -> tuple[Any, Any, Array]:
     """ω, ω3 and attitude on a coast at ``times`` (n,) s; at one time by plain numbers."""
-    coast = Arc(A, C, 0.0, SpinState(omega, spin, quaternion), growth, wheel, sense)
+    body = Bodies(np.array([A, A, C]), np.zeros(3), Forcing((), growth, wheel, sense))
+    start = MotionStretch(body, 0.0, np.array([omega.real, omega.imag, spin]), quaternion)
     if isinstance(times, float):
-        state = coast.end(times)
-        return state.omega, state.spin, state.quaternion
-    rates, turned = coast.motion(times)
+        rates, turned = Piece(start, times).end()
+        return complex(*rates[:2]), float(rates[2]), turned
+    rates, turned = Piece(start, math.inf).motion(times)
     return rates[:, 0] + 1j * rates[:, 1], rates[:, 2], turned
 
 
@@ -113,7 +120,7 @@ def driven(
             m3 -= growth * h3 * (h1 * h1 + h2 * h2) / size
             slip = growth * h3 / size
         rates = [(m1 - (C - B) * q * r) / A, (m2 - (A - C) * r * p) / B, (m3 - (B - A) * p * q) / C]
-        return [*rates, *_turning(rotation, p + slip * B * q, q - slip * A * p, r)]
+        return [*rates, *rotation_rates(rotation, p + slip * B * q, q - slip * A * p, r)]
 
     start = np.concatenate([motion.rates, motion.rotation.ravel()])
     flown = solve_ivp(

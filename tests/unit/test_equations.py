@@ -15,11 +15,11 @@ from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.one_pulse import schedule as one_pulse
 from nutdamp.spacecraft.model import Inertia, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views.guide import EQUATIONS
+from nutdamp.views.guide import entries
 
 PHYSICS = Path(__file__).parent / "physics"
 TESTED = {
-    "test_forced.py::test_stepwise_torques_8_9_10": [
+    "test_rigid.py::test_motion_under_fixed_and_turning_torques": [
         f"M({number})" for number in (1, 2, 3, 5, 6, 8, 9, 10)
     ],
     "test_inertia.py::test_magnus_4_ratio_and_shape": ["M(4)"],
@@ -58,10 +58,11 @@ def test_every_equation_of_magnus_and_kreisel_is_there_once_with_place_and_test(
         *(f"K({number})" for number in range(5, 16)),
         "24.4",
     ]
-    assert [one.number for one in EQUATIONS] == [*sources, "energy sink", "gyrostat"]
-    assert sorted(itertools.chain(*TESTED.values())) == sorted(str(one.number) for one in EQUATIONS)
-    for equation in EQUATIONS:
-        module, _, name = equation.place.rpartition(".")
+    names = [equation.name for equation in entries("equations")]
+    assert names == [*sources, "energy sink", "gyrostat"]
+    assert sorted(itertools.chain(*TESTED.values())) == sorted(names)
+    for equation in entries("equations"):
+        module, _, name = dict(equation.rows)["place"].rpartition(".")
         assert callable(getattr(import_module(module), name))
     for place in TESTED:
         path, _, function = place.partition("::")

@@ -18,20 +18,20 @@ from nutdamp.spacecraft.roles import ROLES
 
 PACKAGE = places.ROOT / "nutdamp"
 LOOSE = {"__init__", "__main__", "api", "errors", "units"}
-LONGEST, SHORTEST = 480, 10
+LONGEST, SHORTEST = 464, 10
 """Statements of a module, but of a scheme: lines can be bought with density. The most
-is what the longest has, control_loop/budget.
+is what the longest has, files/ccsds/read.
 """
 
-FLOORS = 23
+FLOORS = 25
 """Longest chain of imports, those within functions and for types alone too."""
 
-MOST_MODULES, MOST_OUTSIDE = 139, 109
+MOST_MODULES, MOST_OUTSIDE = 141, 113
 """Modules without the markers of packages, and of them those outside views,
 figures and the page.
 """
 
-MOST_LOADED, MOST_LINES = 43, 17_100
+MOST_LOADED, MOST_LINES = 44, 16_360
 """Modules that `plan --scheme two-pulse --nominal` loads for the built-in example, and their lines:
 all that a stranger can meet who follows it.
 """

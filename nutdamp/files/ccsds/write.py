@@ -10,11 +10,11 @@ from __future__ import annotations
 import json
 import math
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
-from itertools import groupby
-from typing import NamedTuple
+from itertools import chain, groupby
+from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -35,6 +35,7 @@ from nutdamp.files.ccsds.message import (
     VERSION,
     Keyword,
     Layout,
+    names,
 )
 from nutdamp.files.ccsds.read import Contents, Manoeuvre
 from nutdamp.files.editing import (
@@ -47,46 +48,37 @@ from nutdamp.files.editing import (
     inertia_edits,
     rate_edits,
 )
-from nutdamp.files.export import AXES, AttitudeSegment, Reference, interpolated
+from nutdamp.files.export import AXES, Reference, interpolated
 from nutdamp.files.reader import Source, read_spacecraft
 from nutdamp.files.yaml import Node
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import momentum_gained
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
-from nutdamp.physics.body import principal_axes
+from nutdamp.physics.inertia import principal_axes
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
 
 class MessageBlock(NamedTuple):
-    """Keywords that belong together, with their values as texts; ``name`` is that of the layout,
-    empty outside of blocks.
+    """Keywords that belong together, with their values as texts, and ``rows`` of a ``record``;
+    ``name`` is that of the layout, META of metadata and DATA of records in an AEM, else empty.
     """
 
     name: str
-    entries: tuple[tuple[Keyword, str], ...]
+    entries: tuple[tuple[Keyword, str], ...] = ()
     comments: tuple[str, ...] = ()
-
-
-class Segment(NamedTuple):
-    """Metadata and the data that they describe: blocks (APM), or records of the layout ``record``
-    (AEM).
-    """
-
-    metadata: MessageBlock
-    blocks: tuple[MessageBlock, ...] = ()
-    records: tuple[tuple[str, ...], ...] = ()
-    record: Layout | None = None
+    rows: tuple[tuple[str, ...], ...] = ()
+    record: Layout = Layout("")
 
 
 class Message(NamedTuple):
-    """A whole message; ``kind`` is APM, AEM or OPM."""
+    """A whole message; ``kind`` is APM, AEM or OPM. Of each segment the first block is metadata."""
 
     kind: str
     header: MessageBlock
-    segments: tuple[Segment, ...]
+    segments: tuple[tuple[MessageBlock, ...], ...]
 
 
 LONGEST_LINE = 254  # ASCII characters that a line may have
@@ -94,17 +86,20 @@ SIGNIFICANT = 16  # most digits that a number may have
 
 VERSION_OF = {"APM": VERSION, "AEM": VERSION, "OPM": "3.0"}
 
-Values = Sequence[str | float | None]
+Values = Mapping[str, Any]
+"""Texts, and numbers (of any shape of one) in the units of the tables, by keyword; None where one
+is left out. A block takes those that are its own.
+"""
 
 
-def block(name: str, keywords: tuple[Keyword, ...], values: Values, *comments: str) -> MessageBlock:
-    """A block of ``values`` of the first ``keywords``, None where one is left out; numbers in the
-    unit of the table.
-    """
+def block(
+    name: str, values: Values, *comments: str, keywords: tuple[Keyword, ...] = ()
+) -> MessageBlock:
+    """A block of ``values`` in the order of its ``keywords``, which are those of its layout."""
     entries = tuple(
-        (keyword, value if isinstance(value, str) else number(value))
-        for keyword, value in zip(keywords, values, strict=False)
-        if value is not None
+        (keyword, value if isinstance(value, str) else number(np.asarray(value).item()))
+        for keyword in keywords or LAYOUTS[name].keywords
+        if (value := values.get(keyword.name)) is not None
     )
     return MessageBlock(name, entries, tuple(comment(text) for text in comments))
 
@@ -157,16 +152,16 @@ def to_xml(message: Message) -> str:
     root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, **versioned})
     _fill(SubElement(root, "header"), message.header)
     body = SubElement(root, "body")
-    for segment in message.segments:
+    for metadata, *blocks in message.segments:
         place = SubElement(body, "segment")
-        _fill(SubElement(place, "metadata"), segment.metadata)
+        _fill(SubElement(place, "metadata"), metadata)
         data = SubElement(place, "data")
-        for part in segment.blocks:
-            _fill(SubElement(data, LAYOUTS[part.name].tag) if part.name else data, part)
-        for record in segment.records:
-            assert segment.record is not None
-            place = SubElement(SubElement(data, "attitudeState"), segment.record.tag)
-            _fill(place, block("", segment.record.keywords, record))
+        for part in blocks:
+            _fill(SubElement(data, LAYOUTS[part.name].tag) if part.name in LAYOUTS else data, part)
+            for row in part.rows:
+                record = SubElement(SubElement(data, "attitudeState"), part.record.tag)
+                values = dict(zip(names(part.record.keywords), row, strict=True))
+                _fill(record, block("", values, keywords=part.record.keywords))
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
@@ -181,41 +176,29 @@ def _fill(place: Element, block: MessageBlock) -> None:
             SubElement(parent, keyword.name, units).text = value
 
 
+EDGED = (*APM_BLOCKS, "META", "DATA")
+"""Blocks between lines of their name."""
+
+
 def to_kvn(message: Message) -> str:
     """The text of a message."""
-    lines = [f"CCSDS_{message.kind}_VERS = {VERSION_OF[message.kind]}", *_kvn_lines(message.header)]
-    for segment in message.segments:
-        metadata = _kvn_lines(segment.metadata)
-        lines += (
-            ["", "META_START", *metadata, "META_STOP"] if message.kind == "AEM" else ["", *metadata]
-        )
-        for block in segment.blocks:
-            inside = _kvn_lines(block)
-            named = block.name in APM_BLOCKS
-            lines += (
-                ["", f"{block.name}_START", *inside, f"{block.name}_STOP"]
-                if named
-                else ["", *inside]
-            )
-        if segment.records:
-            lines += [
-                "",
-                "DATA_START",
-                *(" ".join(record) for record in segment.records),
-                "DATA_STOP",
-            ]
-    return "\n".join(lines) + "\n"
-
-
-def _kvn_lines(block: MessageBlock) -> list[str]:
-    width = max((len(keyword.name) for keyword, _ in block.entries), default=0)
-    return [
-        *(f"COMMENT {comment}" for comment in block.comments),
-        *(
-            f"{keyword.name:<{width}} = {value}" + (f" [{keyword.unit}]" if keyword.unit else "")
-            for keyword, value in block.entries
-        ),
-    ]
+    paragraphs = []
+    for part in (message.header, *chain(*message.segments)):
+        width = max((len(keyword.name) for keyword, _ in part.entries), default=0)
+        lines = [
+            *(f"COMMENT {comment}" for comment in part.comments),
+            *(
+                f"{keyword.name:<{width}} = {value}"
+                + (f" [{keyword.unit}]" if keyword.unit else "")
+                for keyword, value in part.entries
+            ),
+            *map(" ".join, part.rows),
+        ]
+        if part.name in EDGED:
+            lines = [f"{part.name}_START", *lines, f"{part.name}_STOP"]
+        paragraphs.append("\n".join(lines))
+    version = f"CCSDS_{message.kind}_VERS = {VERSION_OF[message.kind]}"
+    return "\n".join([version, "\n\n".join(paragraphs), ""])
 
 
 AXIS = 1e-12  # tilt in rad up to which the symmetry axis counts as the third axis of the file
@@ -226,6 +209,16 @@ FULL = 2.0 * math.pi
 def spinning(inertia: Inertia) -> bool:
     """True where the body fits the model of these keywords: symmetric about axis 3."""
     return inertia.symmetric and math.hypot(*inertia.axes[:2, 2]) <= AXIS
+
+
+def motion_values(rates: Vector, quaternion: Vector) -> dict[str, Vector]:
+    """Keywords of quaternion and rates, as `spin_values` has them.
+
+    The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial
+    turns vectors.
+    """
+    columns = [*quaternion[:, [1, 2, 3, 0]].T, *np.degrees(rates).T]
+    return dict(zip(names((*message.QUATERNION, *message.ANGVEL)), columns, strict=True))
 
 
 def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str, Vector]:
@@ -296,50 +289,52 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     has no duration.
     """
     spacecraft = plan.spacecraft
-    frames = (reference.frame, BODY_FRAME)
     motion = spacecraft.inertia.in_file_axes(
         spacecraft.initial.rates, spacecraft.initial.quaternion
     )
-    rates, quaternion = map(cleaned, motion)
-    # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial
-    # turns vectors.
-    scalar, *vector = quaternion.tolist()
-    blocks = [
-        block("", (Keyword("EPOCH"),), [reference.epoch.text], *_unsaid(spacecraft)),
-        _block("QUAT", [*frames, *vector, scalar]),
-        _block("ANGVEL", [*frames, BODY_FRAME, *np.degrees(rates)]),
-    ]
-    if spinning(spacecraft.inertia):
-        momentum = message.names(message.MOMENTUM)
-        spin = spin_values(spacecraft.inertia, *(values[None] for values in motion))
-        values = [float(value[0]) for name, value in spin.items() if name not in momentum]
-        blocks.append(_block("SPIN", [*frames, *values], euler_rate(spin, rates[2])))
     # The products are minus the entries off the diagonal (annex F6).
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = spacecraft.inertia.tensor.tolist()
-    blocks.append(_block("INERTIA", [BODY_FRAME, xx, yy, zz, -xy, -xz, -yz], PRODUCTS))
-    blocks += _manoeuvres("MAN", plan, reference)
-    about = block("", message.APM_METADATA, [*_identity(spacecraft), None, "UTC"])
-    return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
-
-
-def _block(name: str, values: Values, *comments: str) -> MessageBlock:
-    return block(name, LAYOUTS[name].keywords, values, *comments)
+    told: dict[str, Any] = {
+        **_identity(spacecraft),
+        **{"EPOCH": reference.epoch.text, "REF_FRAME_A": reference.frame},
+        **dict.fromkeys(("REF_FRAME_B", "ANGVEL_FRAME", "INERTIA_REF_FRAME"), BODY_FRAME),
+        **motion_values(*(cleaned(values)[None] for values in motion)),
+        **dict(zip(names(message.INERTIA), (xx, yy, zz, -xy, -xz, -yz), strict=True)),
+    }
+    blocks = [
+        block("", told, *_unsaid(spacecraft), keywords=(Keyword("EPOCH"),)),
+        block("QUAT", told),
+        block("ANGVEL", told),
+    ]
+    if spinning(spacecraft.inertia):
+        spin = spin_values(spacecraft.inertia, *(values[None] for values in motion))
+        rate = euler_rate(spin, float(motion[0][2]))
+        without = dict.fromkeys(names(message.MOMENTUM))
+        blocks.append(block("SPIN", told | spin | without, rate))
+    blocks += [block("INERTIA", told, PRODUCTS), *_manoeuvres("MAN", plan, reference)]
+    about = block("", told, keywords=message.APM_METADATA)
+    return Message("APM", _header(plan, created), ((about, *blocks),))
 
 
 def _header(plan: Plan, created: Epoch) -> MessageBlock:
     moment = created.text.partition(".")[0]
-    values = [None, moment, ORIGINATOR, label(f"{plan.scheme}-{moment}")]
+    values = {
+        "CREATION_DATE": moment,
+        "ORIGINATOR": ORIGINATOR,
+        "MESSAGE_ID": label(f"{plan.scheme}-{moment}"),
+    }
     return block(
         "",
-        message.HEADER,
         values,
         f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}",
         f"status: {plan.verdict.status.value}",
+        keywords=message.HEADER,
     )
 
 
-def _identity(spacecraft: Spacecraft) -> tuple[str, str]:
-    return label(spacecraft.name), label(spacecraft.object_id or "")
+def _identity(spacecraft: Spacecraft) -> dict[str, str]:
+    name, identity = label(spacecraft.name), label(spacecraft.object_id or "")
+    return {"OBJECT_NAME": name, "OBJECT_ID": identity, "TIME_SYSTEM": "UTC"}
 
 
 def _unsaid(spacecraft: Spacecraft) -> list[str]:
@@ -369,8 +364,11 @@ def _unsaid(spacecraft: Spacecraft) -> list[str]:
 def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[MessageBlock]:
     """Blocks of the pulses: MAN with their torques, MANEUVER with their velocity changes."""
     for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
-        timing = (reference.epoch.plus(max(pulse.start, 0.0)).text, pulse.on_time)
-        mass = None if pulse.propellant is None else -pulse.propellant
+        begin = reference.epoch.plus(max(pulse.start, 0.0)).text
+        values: dict[str, Any] = {
+            "MAN_DURATION": pulse.on_time,
+            "MAN_DELTA_MASS": None if pulse.propellant is None else -pulse.propellant,
+        }
         if name == "MAN":
             if pulse.torque is None or pulse.on_time == 0.0:
                 raise BadRequest(
@@ -378,7 +376,9 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[Message
                     "hold; "
                     "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
                 )
-            values = [*timing, BODY_FRAME, *plan.spacecraft.inertia.in_file(pulse.torque), mass]
+            torque = plan.spacecraft.inertia.in_file(pulse.torque)
+            values |= {"MAN_EPOCH_START": begin, "MAN_REF_FRAME": BODY_FRAME}
+            values |= dict(zip(names(message.TORQUE), torque, strict=True))
         else:
             if pulse.force is None:
                 raise BadRequest(
@@ -392,12 +392,9 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[Message
                 )
             assert plan.spacecraft.mass is not None
             gained = momentum_gained(replace(plan._flight, schedule=Schedule((pulse,))))  # inertial
-            values = [
-                *timing,
-                mass,
-                reference.frame,
-                *(KILO * cleaned(gained / plan.spacecraft.mass)),
-            ]
+            change = KILO * cleaned(gained / plan.spacecraft.mass)
+            values |= {"MAN_EPOCH_IGNITION": begin, "MAN_REF_FRAME": reference.frame}
+            values |= {f"MAN_DV_{axis}": part for axis, part in enumerate(change, start=1)}
         comments = [f"pulse {place}: {pulse.channel}"]
         if pulse.through_valve:
             start, on_time = pulse.loaded
@@ -408,7 +405,7 @@ def _manoeuvres(name: str, plan: Plan, reference: Reference) -> Iterator[Message
                 f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the "
                 "torque given."
             )
-        yield _block(name, values, *comments)
+        yield block(name, values, *comments)
 
 
 def aem(
@@ -427,10 +424,37 @@ def aem(
     spacecraft = plan.spacecraft
     if kind == SPIN_NUTATION_MOM and not spinning(spacecraft.inertia):
         kind = SPIN
-    segments = tuple(
-        _segment(spacecraft, stretch, reference, kind) for stretch in interpolated(flown, until)
-    )
-    return Message("AEM", _header(plan, created), segments)
+    record = message.AEM_RECORDS[kind]
+    about = _identity(spacecraft) | {
+        "REF_FRAME_A": reference.frame,
+        "REF_FRAME_B": BODY_FRAME,
+        "ATTITUDE_TYPE": kind,
+        "INTERPOLATION_METHOD": "LAGRANGE" if kind == SPIN else "HERMITE",
+        "INTERPOLATION_DEGREE": "3",
+    }
+    segments = []
+    for stretch in interpolated(flown, until):
+        times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
+        useable = {"START_TIME": times[0], "STOP_TIME": times[-1]}  # all of it
+        comments = [f"pulses completed: {stretch.completed}"]
+        if kind == QUATERNION_ANGVEL:
+            about["ANGVEL_FRAME"] = BODY_FRAME
+            motion = motion_values(stretch.rates, stretch.quaternion)
+        else:
+            motion = spin_values(spacecraft.inertia, stretch.rates, stretch.quaternion)
+            comments.append(
+                ALONE if kind == SPIN else euler_rate(motion, float(stretch.rates[0, 2]))
+            )
+        if kind == SPIN:
+            motion["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
+        columns = [map(number, motion[name].tolist()) for name in names(record.keywords)[1:]]
+        segments.append(
+            (
+                block("META", about | useable, *comments, keywords=message.AEM_METADATA),
+                MessageBlock("DATA", rows=tuple(zip(times, *columns, strict=True)), record=record),
+            )
+        )
+    return Message("AEM", _header(plan, created), tuple(segments))
 
 
 ALONE = (
@@ -438,50 +462,6 @@ ALONE = (
     "nutation."
 )
 """Comment on records of the spin alone."""
-
-
-def _segment(
-    spacecraft: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str
-) -> Segment:
-    times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
-    useable = (times[0], None, None, times[-1])  # all of it
-    axes = BODY_FRAME if kind == QUATERNION_ANGVEL else None
-    method = "LAGRANGE" if kind == SPIN else "HERMITE"
-    values = [
-        *_identity(spacecraft),
-        None,
-        reference.frame,
-        BODY_FRAME,
-        "UTC",
-        *useable,
-        kind,
-        None,
-        axes,
-        method,
-        "3",
-    ]
-    comments = [f"pulses completed: {stretch.completed}"]
-    if kind == QUATERNION_ANGVEL:
-        columns = np.column_stack([stretch.quaternion[:, [1, 2, 3, 0]], np.degrees(stretch.rates)])
-    else:
-        spin = spin_values(spacecraft.inertia, stretch.rates, stretch.quaternion)
-        if kind == SPIN:
-            spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
-            comments.append(ALONE)
-        else:
-            comments.append(euler_rate(spin, float(stretch.rates[0, 2])))
-        columns = np.column_stack(
-            [spin[keyword.name] for keyword in message.AEM_RECORDS[kind].keywords[1:]]
-        )
-    records = tuple(
-        (time, *map(number, row)) for time, row in zip(times, columns.tolist(), strict=True)
-    )
-    return Segment(
-        block("", message.AEM_METADATA, values, *comments),
-        records=records,
-        record=message.AEM_RECORDS[kind],
-    )
-
 
 PART = (
     "Only the part with the manoeuvres: the spacecraft file has no orbit.",
@@ -503,14 +483,18 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         )
     orbit = spacecraft.orbit
     blocks = []
-    centre = None if orbit is None else orbit.center
-    about = [*_identity(spacecraft), centre, reference.frame, "UTC"]
+    about = _identity(spacecraft) | {"REF_FRAME": reference.frame}
     if orbit is not None:
+        about["CENTER_NAME"] = orbit.center
         state = KILO * np.concatenate([orbit.position, orbit.velocity])
-        blocks.append(_block("STATE", [reference.epoch.text, *state]))
-    blocks += [_block("SPACECRAFT", [spacecraft.mass]), *_manoeuvres("MANEUVER", plan, reference)]
-    metadata = block("", message.OPM_METADATA, about, *(PART if orbit is None else ()))
-    return Message("OPM", _header(plan, created), (Segment(metadata, tuple(blocks)),))
+        keywords = names(LAYOUTS["STATE"].keywords)
+        values = dict(zip(keywords, (reference.epoch.text, *state), strict=True))
+        blocks.append(block("STATE", values))
+    mass = block("SPACECRAFT", {"MASS": spacecraft.mass})
+    blocks += [mass, *_manoeuvres("MANEUVER", plan, reference)]
+    remarks = PART if orbit is None else ()
+    metadata = block("", about, *remarks, keywords=message.OPM_METADATA)
+    return Message("OPM", _header(plan, created), ((metadata, *blocks),))
 
 
 # --- spacecraft files from messages: new ones with a schedule, or others merged into

@@ -38,7 +38,7 @@ from nutdamp.schemes.correction import Correction, SymmetricModel, model_of, sol
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import GrowingProgram, Shares
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
-from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, misses, small_angles
+from nutdamp.schemes.optimal.refinement import AROUND, Influence, along, small_angles
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
@@ -57,7 +57,10 @@ CORRECTED = 4  # flights by which the length of a spin change is corrected
 
 
 def spin_changes(problem: Problem) -> Iterator[Schedule]:
-    """Simple spin changes that keep limits and requirement; none where H has a target."""
+    """Simple spin changes that keep limits and requirement; none where H has a target.
+
+    The pulses of a channel from one moment on, one each turn or one after the other.
+    """
     spacecraft, goal = problem.spacecraft, problem.spacecraft.goal.spin
     if goal is None or spacecraft.goal.axis is not None:
         return
@@ -65,25 +68,22 @@ def spin_changes(problem: Problem) -> Iterator[Schedule]:
         if (goal - spacecraft.spin) * channel.axial <= 0.0:
             continue
         starts = STARTS if abs(channel.transverse) > 1e-12 * abs(channel.axial) else 1
-        for number in range(starts):
-            start = spacecraft.limits.earliest + number / starts * spacecraft.nutation_period
-            for turns in (0.0, 2.0 * math.pi / spacecraft.fastest):
-                if schedule := _spin_change(problem, goal, channel, start, turns):
+        whole = (goal - spacecraft.spin) * spacecraft.inertia.C / channel.axial
+        count = max(math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)), 1)
+        turns = (0.0, 2.0 * math.pi / spacecraft.fastest)[: 1 if count == 1 else 2]
+        if count <= MOST_PULSES:
+            for number, turn in itertools.product(range(starts), turns):
+                start = spacecraft.limits.earliest + number / starts * spacecraft.nutation_period
+                if schedule := _spin_change(problem, channel, whole, count, start, turn):
                     yield schedule
 
 
 def _spin_change(
-    problem: Problem, goal: float, channel: Channel, start: float, turn: float
+    problem: Problem, channel: Channel, whole: float, count: int, start: float, turn: float
 ) -> Schedule | None:
-    """The pulses of a ``channel`` from ``start`` s on, one each ``turn`` s or one after the other;
-    else None.
-    """
+    """So many pulses that are on for about ``whole`` s together, corrected on their flights."""
     spacecraft, tick = problem.spacecraft, problem.spacecraft.limits.tick
-    rate = channel.axial / spacecraft.inertia.C
-    whole = (goal - spacecraft.spin) / rate
-    count = max(math.ceil(whole / channel.max_on_time * (1.0 - 1e-9)), 1)
-    if count > MOST_PULSES or (count == 1 and turn > 0.0):
-        return None
+    goal = spacecraft.goal.spin or 0.0
     for _ in range(CORRECTED):
         on_time = Windows(spacecraft).nearest_tick(whole / count)
         if not channel.min_on_time <= on_time <= channel.max_on_time * (1.0 + 1e-12):
@@ -91,21 +91,18 @@ def _spin_change(
         apart = max(turn, on_time + spacecraft.limits.gap)
         if tick is not None:
             start, apart = (math.ceil(time / tick - 1e-9) * tick for time in (start, apart))
-        centres = (start + number * apart + 0.5 * on_time for number in range(count))
-        schedule = Schedule(tuple(channel_pulse(channel, centre, on_time) for centre in centres))
+        centres = start + apart * np.arange(count) + 0.5 * on_time
+        schedule = Schedule(tuple(channel_pulse(channel, t, on_time) for t in centres.tolist()))
         if schedule.end > spacecraft.horizon:
             return None
         flight = problem.flown(schedule)
         missed = goal - flight.settled.spin
         if tick is not None or abs(missed) < 1e-12 * abs(goal):
             break
-        whole += missed / rate
+        whole += missed * spacecraft.inertia.C / channel.axial
     held = requirements.held(spacecraft, left_by(flight))
-    return (
-        schedule
-        if all(bound.met for bound in held) and keeps_limits(spacecraft, schedule)
-        else None
-    )
+    kept = all(bound.met for bound in held) and keeps_limits(spacecraft, schedule)
+    return schedule if kept else None
 
 
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
@@ -114,7 +111,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 
     The later ones take longer to plan, and are rarely better.
     """
-    from nutdamp.schemes import four_pulse, half_cone, one_pulse, rhumb_line, two_pulse
+    from nutdamp.schemes import half_cone, legs, one_pulse, rhumb_line, two_pulse
 
     # The Sun keeps the phase of trains alone.
     without = replace(spacecraft, steerable=None, goal=replace(spacecraft.goal, sun=None))
@@ -132,7 +129,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
             plans.append(
                 (
                     FOUR_PULSE,
-                    lambda _, options: four_pulse.on_true_motion(without, options),
+                    lambda _, options: legs.on_true_motion(without, options),
                     FourPulseOptions(),
                 )
             )
@@ -165,9 +162,9 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
 SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
-# Steps in which the earliest end by small angles is found: ends found to 0.1 % were up to 8 %
-# later, for the next of the shares added to it was taken then.
-HALVINGS = 10
+# Relative accuracy of the earliest end by small angles. With a less accurate one the next of the
+# shares added to it was taken, and ends were up to 8 % later.
+SHARP = 1e-3
 # Shares added to the earliest end by small angles that are tried in turn.
 LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
 
@@ -186,13 +183,9 @@ def earliest(problem: Problem) -> Schedule | None:
 
     if _pieces(problem, influence, horizon) is None:
         return None
-    low, high = begin, horizon
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        enough = _pieces(problem, influence, middle) is not None
-        low, high = (low, middle) if enough else (middle, high)
-        if work.exhausted():
-            return None
+    high = problem.least_horizon(
+        begin, horizon, SHARP, lambda end: _pieces(problem, influence, end) is not None
+    )
     for share in LONGER:
         end = min(high + share * (high - begin), horizon)
         schedule = within(problem, end)
@@ -206,10 +199,9 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
     none is found.
     """
     influence = small_angles(problem.spacecraft, problem.equations)
+    slot = 2.0 * math.pi / problem.spacecraft.fastest / SLOTS
     late = 0.0
-    for _ in range(
-        LINES
-    ):  # programs, each about the flight of the one before: at large angles small ones mislead
+    for _ in range(LINES):
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon - late)
         if pieces is None:
             return None
@@ -223,13 +215,8 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
         burns = _burns(problem, *pieces[:2])
-        influence = along(problem.flown(burns), problem.equations, _slot(problem))
+        influence = along(problem.flown(burns), problem.equations, slot)
     return None
-
-
-def _slot(problem: Problem) -> float:
-    """Width of a slot, s, where there is room for as many."""
-    return 2.0 * math.pi / problem.spacecraft.fastest / SLOTS
 
 
 def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | None:
@@ -237,11 +224,12 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> Pieces | 
     to first order.
     """
     spacecraft, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
-    if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None or not channels:
+    if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None:
         # burns may not follow each other without a gap, begin at any time and be of any number
         return None
     begin = limits.earliest
-    count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
+    turns = (horizon - begin) * spacecraft.fastest / (2.0 * math.pi)
+    count = min(max(math.ceil(turns * SLOTS), 2 * SLOTS // 3), MOST_SLOTS)
     edges = np.linspace(begin, horizon, count + 1)
     free = np.flatnonzero(~Windows(spacecraft).blocked(edges[:-1], edges[1:]))
     width = float(edges[1] - edges[0])
@@ -328,21 +316,14 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
     which, times, off = pieces
     aside = np.array([0.0, 0.0, *off, 0.0])[problem.equations.chosen]
     spacecraft = problem.spacecraft
-    size = float(np.linalg.norm(problem.spacecraft.momentum))
+    size = float(np.linalg.norm(spacecraft.momentum))
     scale = np.full(len(times), float(times.max(initial=1e-9)))
-    most = spacecraft.horizon - spacecraft.limits.earliest
-    task = (
-        Task(spacecraft, problem.equations, problem.channels, problem.costs)
-        if problem.closed
-        else None
-    )
+    most = np.full(len(times), spacecraft.horizon - spacecraft.limits.earliest)
+    task = Task(spacecraft, problem.equations, problem.channels, problem.costs)
     firing = which >= 0
 
     def left(rows: Vector) -> Vector:
         """Misses of many times (k, n) s, (k, equations), over |H|."""
-        if task is None:
-            flown = (problem.flown(_burns(problem, which, times)) for times in rows)
-            return np.array([misses(flight, problem.equations) - aside for flight in flown]) / size
         starts = spacecraft.limits.earliest + np.cumsum(rows, axis=1) - rows
         settings = np.hstack([starts[:, firing], rows[:, firing]])
         return task.misses(np.tile(which[firing], (len(rows), 1)), settings, 0) - aside / size
@@ -350,7 +331,6 @@ def _exact(problem: Problem, pieces: Pieces) -> Schedule:
     def slopes(times: Vector, value: Vector) -> Vector:
         return (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
 
-    bounds = np.zeros(len(times)), np.full(len(times), most)
-    free = np.column_stack([times, scale, *bounds])
+    free = np.column_stack([times, scale, np.zeros(len(times)), most])
     times = solve(lambda times: left(times[None])[0], free, work.exhausted, slopes)
     return _burns(problem, which, times)

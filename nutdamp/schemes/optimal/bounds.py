@@ -215,11 +215,10 @@ def rigorous(
         spacecraft.disturbances
         or spacecraft.growth != 0.0
         or any(channel.name not in prices for channel in channels)
+        or spacecraft.goal.spin is not None
+        or not spacecraft.inertia.symmetric
+        or allowed.nutation >= 0.5 * math.pi  # the spin axis points away from H
     ):
-        return None
-    if spacecraft.goal.spin is not None or not spacecraft.inertia.symmetric:
-        return None
-    if allowed.nutation >= 0.5 * math.pi:  # the spin axis points away from H
         return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])

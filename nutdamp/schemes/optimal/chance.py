@@ -133,7 +133,6 @@ class ChanceProgram:
         self.uncertain = uncertain
         spacecraft = program.spacecraft
         self.turn = 2.0 * np.pi / spacecraft.fastest
-        self.slot_turns = self.turn_of(program.centres)
         self.effects, self.changes, self.rates = (
             uncertain.effects,
             uncertain.changes,
@@ -148,11 +147,8 @@ class ChanceProgram:
         self.width = np.where(
             self.unit < program.width, 0.0, program.width
         )  # strong ones act at a moment
-        kinds = {limit.kind for limit in limits}
-        channels = range(len(cost))
-        self.turned = {
-            kind: [self.turns(kind, self._all(channel)) for channel in channels] for kind in kinds
-        }
+        every = np.arange(len(program.centres))
+        self.slots = [self._slots(np.full(len(every), k), every) for k in range(len(cost))]
 
     def turn_of(self, times: Vector) -> NDArray[np.int_]:
         """Number from 0 of the turn, of the faster of both rates, in which ``times`` (n,) s lie."""
@@ -242,7 +238,7 @@ class ChanceProgram:
         # Columns to begin with: those that pull along the goal, or back.
         toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
         worth = np.abs(
-            (toward * self.turns(0, self._all(0))[None, :] * self.effects[0][:, None]).real
+            (toward * self.turns(0, self.slots[0])[None, :] * self.effects[0][:, None]).real
         )
         worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
         channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
@@ -312,11 +308,6 @@ class ChanceProgram:
                 tangents.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
         return tangents
 
-    def _all(self, channel: int) -> ProgramColumns:
-        """All slots of a channel."""
-        every = np.arange(len(self.program.centres))
-        return self._slots(np.full(len(every), channel), every)
-
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.program.centres[slot], self.width[channel])
 
@@ -335,41 +326,17 @@ class ChanceProgram:
         """Slots that would lower the cost, the best; of channels that act at once the best moments
         too.
         """
-        active = [
-            (tangent, price)
-            for tangent, price in zip(tangents, shadows.tolist(), strict=True)
-            if price < -1e-12
-        ]
-        worth = np.array(
-            [self._worth(channel, active, margin) - cost for channel, cost in enumerate(self.cost)]
-        )
+        worth = np.tile(-self.cost[:, None], (1, len(self.program.centres)))
+        for tangent, price in zip(tangents, shadows.tolist(), strict=True):
+            if price < -1e-12:
+                rows = (self.row(tangent, columns, margin) for columns in self.slots)
+                worth += price * np.array(list(rows))
         worth[self.program.forbidden] = -np.inf
         worth[
             taken.channel,
             np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width),
         ] = -np.inf
         return self._slots(*above(worth, PRICE, BEST))
-
-    def _worth(self, channel: int, active: list[tuple[Tangent, float]], margin: float) -> Vector:
-        """Worth of one unit of a channel in each slot by tangents and their prices."""
-        worth = np.zeros(len(self.program.centres))
-        for kind, turned in self.turned.items():
-            effect, changes = self.effects[kind, channel], self.changes[kind, channel]
-            fixed = 0j
-            rate = 0j
-            own = np.zeros(self.slot_turns[-1] + 1, dtype=complex)
-            for tangent, price in active:
-                if tangent.limit.kind == kind:
-                    weight = price * np.conj(tangent.u)
-                    fixed += weight * (effect + margin * changes @ tangent.shared)
-                    rate += weight * margin * 1j * (self.rates[kind] @ tangent.shared) * effect
-                    pulses = tangent.own[:, 0].astype(int)
-                    mine = pulses // TURNS == channel
-                    own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
-            worth += (
-                turned[channel] * (fixed + rate * self.program.centres + own[self.slot_turns])
-            ).real
-        return np.asarray(worth * (self.unit[channel] / self.scale))
 
 
 def directions_of(limit: ChanceLimit, count: int) -> Complex:

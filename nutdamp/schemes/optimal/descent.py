@@ -21,8 +21,7 @@ from nutdamp.common import work
 from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude
-from nutdamp.physics.motion import BLOCK, MotionStretch, advance
-from nutdamp.physics.series import Bodies
+from nutdamp.physics.motion import BLOCK, Bodies, MotionStretch, advance
 from nutdamp.schemes.optimal.refinement import (
     AROUND,
     EndEquations,
@@ -99,43 +98,47 @@ class Task:
         self.pace = min(1.0 / spacecraft.fastest, spacecraft.inertial_period)
         dynamics = make_dynamics(spacecraft)
         start = spacecraft.initial
-        # External torques with and without disturbances, see `Bodies`.
-        self._forced = dynamics.constant, dynamics.forcing
-        self._coasting = np.zeros(3), dynamics.forcing._replace(turning=(), timed=())
+        self._forced = dynamics.constant, dynamics.forcing  # external torques, see `Bodies`
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
-        self._decays = spacecraft.growth != 0.0
-        self._free = dynamics.free and not self._decays
+        self._free = dynamics.free and spacecraft.growth == 0.0
+        self._pace = float(np.linalg.norm(start.rates))
         self._linear = None if spacecraft.inertia.symmetric else small_angles(spacecraft, equations)
         self._across = square_to_target(spacecraft)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
-        Pulses act as so many ``kicks`` spread over them, without disturbances, with I1 ≠ I2 as at
-        small angles; 0: the true motion.
+        Pulses act as so many ``kicks`` spread over them, without disturbances and dissipation, with
+        I1 ≠ I2 as at small angles; 0: the true motion.
         """
-        parts = [slice(begin, begin + BLOCK) for begin in range(0, len(x), BLOCK)]
-        flown = [self._misses(which[part], x[part], kicks) for part in parts]
-        return np.concatenate([np.zeros((0, len(self.chosen))), *flown])
-
-    def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
-        count, n = which.shape
-        work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
-        if kicks and self._linear is not None:
-            return self._at_small_angles(self._linear, which, x)
-        flown = self._together if self._free or (kicks and not self._decays) else self._in_turn
-        momentum, turn = flown(which, x, kicks)
-        inertial = attitude.rotate(turn.T, momentum.T)
-        shift = inertial @ self._across.T
-        shift[inertial @ self.spacecraft.target_axis < 0.0] += (
-            self.momentum
-        )  # the other way round is no solution
-        if self.loose:
-            shift = shift - self.off * x[:, -2:]
-        spin = momentum[2] - self.spacecraft.inertia.axial(self.spin)
-        return np.asarray(
-            np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum
-        )
+        misses = [np.zeros((0, len(self.chosen)))]
+        for begin in range(0, len(x), BLOCK):
+            some, part = which[begin : begin + BLOCK], x[begin : begin + BLOCK]
+            work.spend(which.shape[1] * (max(kicks, 1) + 1) * (FLIGHT + CASE * len(part)))
+            if kicks and self._linear is not None:
+                misses.append(self._at_small_angles(self._linear, some, part))
+                continue
+            # The true motion of a body with dissipation, which follows the kicks, is dear.
+            if not self._free and (not kicks or self.spacecraft.growth):
+                n = which.shape[1]
+                turned = float(np.max(part[:, n - 1] + part[:, 2 * n - 1])) * self._pace
+                work.spend(turned * (RADIAN + CASE_RADIAN * len(part)))
+            momentum, turn = (
+                self._together(some, part, kicks)
+                if kicks or self._free
+                else self._in_turn(some, part)
+            )
+            inertial = attitude.rotate(turn.T, momentum.T)
+            shift = inertial @ self._across.T
+            shift[inertial @ self.spacecraft.target_axis < 0.0] += (
+                self.momentum
+            )  # the other way round is no solution
+            if self.loose:
+                shift = shift - self.off * part[:, -2:]
+            spin = momentum[2] - self.spacecraft.inertia.axial(self.spin)
+            ended = np.column_stack([momentum[:2].T, shift, spin])
+            misses.append(ended[:, self.chosen] / self.momentum)
+        return np.concatenate(misses)
 
     def _at_small_angles(self, linear: Influence, which: Indices, x: Vector) -> Vector:
         """Misses by the equations of small angles."""
@@ -148,33 +151,24 @@ class Task:
             left[:, 2:4] -= self.off * x[:, -2:]
         return np.asarray(left / self.momentum)
 
-    def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
+    def _in_turn(self, which: Indices, x: Vector) -> tuple[Vector, Vector]:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
-        turned = float(np.max(x[:, n - 1] + x[:, 2 * n - 1])) * float(
-            np.linalg.norm(self._start[1])
-        )
-        work.spend(turned * (RADIAN + CASE_RADIAN * count))
+        starts, on_times = x[:, :n], x[:, n : 2 * n]
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        bodies = Bodies(moments, *(self._coasting if kicks else self._forced))
+        bodies = Bodies(moments, *self._forced)
         now = np.zeros(count)
         for pulse in range(n):
-            begin = x[:, pulse]
-            on_time = x[:, n + pulse]
             torque = self.torques[which[:, pulse]].T
-            for kick in range(kicks):
-                t = begin + on_time * ((kick + 0.5) / kicks)
-                advance(MotionStretch(bodies, now, rates, turn), t - now)
-                rates += torque * (on_time / kicks) / moments
-                now = t
-            if not kicks:
-                advance(MotionStretch(bodies, now, rates, turn), begin - now)
-                advance(MotionStretch(bodies, begin, rates, turn, torque), on_time)
-                now = begin + on_time
+            advance(MotionStretch(bodies, now, rates, turn), starts[:, pulse] - now)
+            advance(
+                MotionStretch(bodies, starts[:, pulse], rates, turn, torque), on_times[:, pulse]
+            )
+            now = starts[:, pulse] + on_times[:, pulse]
         return bodies.momentum(rates), turn
 
     def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
-        """`_in_turn` of a body without external torque, all stretches at once."""
+        """`_in_turn` of a symmetric body left alone; in real widths, or so many kicks in each."""
         # In the frame that turns with the nutation pulses add to H whatever it is, and between them
         # the body turns about H and its own axis: so the motion at all edges is known first, and
         # then all turns are. A quaternion is a pair of complex numbers, w + iz and x + iy.
@@ -182,8 +176,7 @@ class Task:
         (A, _, C), rates, turn = self._start
         wheel = self.spacecraft.inertia.wheel
         parts = max(kicks, 1)
-        starts = x[:, :n]
-        widths = x[:, n : 2 * n]
+        starts, widths = x[:, :n], x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
             shares = (np.arange(kicks) + 0.5) / kicks
@@ -202,12 +195,11 @@ class Task:
             added = self._pulsed(which, np.zeros_like(added), before, widths)[0] * np.exp(
                 1j * within
             )
-        elif not kicks:
+        else:
             added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
         after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
-        across = (
-            after - added * begun
-        ) / begun  # in body axes as each pulse begins: H turns back in a coast
+        # In body axes as each pulse begins: H turns back in a coast.
+        across = (after - added * begun) / begun
         size = np.sqrt(across.real**2 + across.imag**2 + before**2)
         cosine, sine = cos_sin(0.5 / A * size * coasts)
         sine /= np.where(size > 0.0, size, 1.0)
@@ -218,9 +210,16 @@ class Task:
                 (first, second), self._pulsed(which, across, before, widths)[1:], strict=True
             )
             first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
-        first, second = _product(first, second)
+        while (number := first.shape[1]) > 1:  # the product of all turns in their order, by pairs
+            last = number & ~1
+            u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
+            products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
+            first, second = (
+                np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products
+            )
         momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
-        spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
+        (one,), (other,) = first.T, second.T
+        spun = attitude.product(turn, (one.real, other.real, other.imag, one.imag))
         return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
 
     def _pulsed(
@@ -229,19 +228,13 @@ class Task:
         """H across axis 3 (b, n) after pulses, each alone, that begin with H ``across`` and along
         it; turn of each.
         """
-        count = which.size
-        moments = np.repeat(self._start[0][:, None], count, axis=1)
-        rates = (
-            np.array([across.real, across.imag, before - self.spacecraft.inertia.wheel]).reshape(
-                3, -1
-            )
-            / moments
-        )
-        turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
-        bodies = Bodies(moments, *self._coasting)
-        stretch = MotionStretch(
-            bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T
-        )
+        moments = np.repeat(self._start[0][:, None], which.size, axis=1)
+        begun = np.array([across.real, across.imag, before - self.spacecraft.inertia.wheel])
+        rates = begun.reshape(3, -1) / moments
+        turns = np.repeat(np.eye(4)[:, :1], which.size, axis=1)
+        bodies = Bodies(moments, *self._forced)
+        torques = self.torques[which].reshape(-1, 3).T
+        stretch = MotionStretch(bodies, np.zeros(which.size), rates, turns, torques)
         advance(stretch, widths.ravel())
         pairs = (rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2])
         after, *turned = ((real + 1j * imaginary).reshape(which.shape) for real, imaginary in pairs)
@@ -290,20 +283,6 @@ class Task:
             matrix = np.vstack([np.pad(matrix, ((0, 0), (0, 2))), sides])
             levels.append(np.full((count, len(sides)), -math.cos(math.pi / len(sides))))
         return matrix, np.hstack(levels)
-
-
-def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
-    """Product (b,) of quaternions (b, n) in their order, each a pair of complex numbers as in
-    `Task`.
-    """
-    while (count := first.shape[1]) > 1:
-        last = count & ~1
-        u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
-        products = (u * w - v * z.conj(), first), (u * z + v * w.conj(), second)
-        first, second = (
-            np.concatenate([product, rest[:, last:]], axis=1) for product, rest in products
-        )
-    return first[:, 0], second[:, 0]
 
 
 WHOLE, SHARES = (
@@ -439,20 +418,54 @@ class Descent:
         move[lost], prices[lost] = 0.0, 0.0
         penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
         ahead = np.einsum("bi,bi->b", uphill, move)
-        line = _LineSearch(self, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
+        slope = np.minimum(ahead - penalty * np.abs(old.misses).sum(axis=1), 0.0)
         closer = np.einsum("bri,bi->br", rows, move)
         step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
-        there = line.tried(step)
-        if len(k := line.active):  # the equations are curved: from there back onto them
-            back, _ = _newton(old.slopes[k], curvature[k], 0.0 * step[k], there, 0.0 * prices[k])
-            line.tried(step[k] + back)
-        if len(line.active):
-            line.tried(step[line.active], SHARES)
-        x, slack, misses = line.x, line.slack, line.misses
+
+        def merit(x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
+            dear = np.einsum("bi,bi->b", self.price[k], x / self.scale[k])
+            dear -= old.barrier[k] * np.log(slack).sum(axis=1)
+            return np.asarray(dear + penalty[k] * np.abs(misses).sum(axis=1))
+
+        # Along the step, by the first share of it by which cost, barrier and misses fall enough.
+        x, slack, misses = old.x.copy(), old.slack.copy(), old.misses.copy()
+        stuck = np.arange(len(x))
+        before = merit(x, slack, misses, stuck)
+        for attempt, shares in enumerate((WHOLE, WHOLE, SHARES)):
+            if not len(stuck):
+                break
+            moved = step[stuck]
+            if attempt == 1:  # the equations are curved: from there back onto them
+                moved = (
+                    moved
+                    + _newton(
+                        old.slopes[stuck],
+                        curvature[stuck],
+                        0.0 * moved,
+                        misses[stuck],
+                        0.0 * prices[stuck],
+                    )[0]
+                )
+            k, share = np.tile(stuck, len(shares)), np.repeat(shares, len(stuck))
+            moved = share[:, None] * np.tile(moved, (len(shares), 1))
+            room = old.slack[k] + np.einsum("bri,bi->br", rows[k], moved)
+            # As much of the room must be left.
+            inside = np.all(room > LEAST_ROOM * old.slack[k], axis=1)
+            there = np.where(inside[:, None], old.x[k] + moved * self.scale[k], old.x[k])
+            room = np.where(inside[:, None], room, old.slack[k])
+            missed = self.task.misses(self.sequences.which[k], there, self.kicks)
+            least = before[k] + 1e-4 * share * slope[k] + 1e-11 * np.abs(before[k])
+            enough = (inside & (merit(there, room, missed, k) <= least)).reshape(len(shares), -1)
+            none = ~enough.any(axis=0)
+            # Rows of the first share that falls enough, or of the last.
+            chosen = np.where(none, len(shares) - 1, np.argmax(enough, axis=0)) * len(stuck)
+            chosen += np.arange(len(stuck))
+            x[stuck], slack[stuck], misses[stuck] = there[chosen], room[chosen], missed[chosen]
+            stuck = stuck[none]
         slopes = self.task.slopes(self.sequences.which, x, self.scale, misses, self.kicks)
         change = np.einsum("bmi,bm->bi", slopes - old.slopes, prices)
         curvature = _curved(old.curvature, (x - old.x) / self.scale, change)
-        curvature[line.active] = np.eye(x.shape[1])
+        curvature[stuck] = np.eye(x.shape[1])
         dearer = old.barrier[:, None] / old.slack - old.dual - weight * closer
         dual = old.dual + _to_bound(old.dual, dearer, old.barrier)[:, None] * dearer
         central = old.barrier[:, None] / slack
@@ -475,60 +488,6 @@ class Descent:
         return DescentState(
             x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error
         )
-
-
-class _LineSearch:
-    """The search along a step for less of cost, barrier and misses, which fall by ``slope`` (b,) at
-    first.
-    """
-
-    def __init__(self, descent: Descent, penalty: Vector, slope: Vector) -> None:
-        self.descent, self.old, self.penalty, self.slope = (
-            descent,
-            descent.state,
-            penalty,
-            np.minimum(slope, 0.0),
-        )
-        self.x, self.slack, self.misses = (
-            self.old.x.copy(),
-            self.old.slack.copy(),
-            self.old.misses.copy(),
-        )
-        self.active = np.arange(len(penalty))  # sequences for which no step was good enough so far
-        self.before = self._merit(self.x, self.slack, self.misses, self.active)
-
-    def tried(self, step: Vector, shares: Vector = WHOLE) -> Vector:
-        """Take the first share of the scaled ``step`` (k, v) that falls enough, or the last: the
-        misses of these.
-        """
-        count = len(shares)
-        k = np.tile(self.active, len(shares))
-        share = np.repeat(shares, len(self.active))
-        old = self.old
-        step = share[:, None] * np.tile(step, (count, 1))
-        slack = old.slack[k] + np.einsum("bri,bi->br", self.descent.rows[k], step)
-        inside = np.all(
-            slack > LEAST_ROOM * old.slack[k], axis=1
-        )  # as much of the room must be left
-        x = np.where(inside[:, None], old.x[k] + step * self.descent.scale[k], old.x[k])
-        slack = np.where(inside[:, None], slack, old.slack[k])
-        misses = self.descent.task.misses(self.descent.sequences.which[k], x, self.descent.kicks)
-        least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
-        enough = (inside & (self._merit(x, slack, misses, k) <= least)).reshape(count, -1)
-        stuck = ~enough.any(axis=0)
-        # Rows of the first that falls enough.
-        first = np.where(stuck, count - 1, np.argmax(enough, axis=0)) * len(stuck) + np.arange(
-            len(stuck)
-        )
-        for part, there in ((self.x, x), (self.slack, slack), (self.misses, misses)):
-            part[self.active] = there[first]
-        self.active = self.active[stuck]
-        return np.asarray(misses[first][stuck])
-
-    def _merit(self, x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
-        dear = np.einsum("bi,bi->b", self.descent.price[k], x / self.descent.scale[k])
-        dear -= self.old.barrier[k] * np.log(slack).sum(axis=1)
-        return np.asarray(dear + self.penalty[k] * np.abs(misses).sum(axis=1))
 
 
 def _weighted(rows: Vector, weight: Vector) -> Vector:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import highspy
 import numpy as np
@@ -26,7 +26,6 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 
 # cost of what no column supplies, over the dearest channel's: used only where there is no solution
 SLACK_COST = 1e3
-PROVED = 1e-6  # shortfall by which a program is proved to have no solution, over all there is to do
 LOOK = 0.05  # peaks of the price this far below zero are looked at more closely within their slots
 
 
@@ -207,14 +206,12 @@ class Program:
         if self.off > 0.0:
             self._ring[2:4] = AROUND
         self._grid: Vector | None = None
-        self._looked = 0
 
     def solve(self, columns: ProgramColumns | None = None, *, enough: bool = False) -> Solution:
         """Least cost over the ``columns`` given, or over all that is not forbidden, by column
         generation.
 
-        ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is
-        known.
+        ``enough``: only to see whether there is a solution, at whatever cost.
         """
         work.spend(
             SOLVED + (SLOT * self.forbidden.size if columns is None else COLUMN * len(columns.t))
@@ -235,7 +232,7 @@ class Program:
                 if unmet > SOME:  # columns that would supply it may not be among them yet
                     return unsolved
                 break
-            if enough and (unmet <= SOME or self._out_of_reach(optimum.prices)):
+            if enough and unmet <= SOME:
                 break
             new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):
@@ -276,7 +273,7 @@ class Program:
             reach = np.abs(self._coefficients(columns)).max(axis=1, initial=0.0)
         # Where H may end off its target, the shares of the directions add up to no more than `off`.
         shares = min(ring.shape[1], 1)
-        limited = int(self._longest(columns).limit.max(initial=-1)) + 1
+        limited = int(self._longest(columns).limit.max(initial=shares - 1)) + 1 - shares
         work.spend(LIMITED * limited)
         limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(limited)])
         master = GrowingProgram(
@@ -293,13 +290,8 @@ class Program:
     def _add(self, master: GrowingProgram, columns: ProgramColumns) -> None:
         """Let the program have these columns."""
         most = np.where(columns.width > 0.0, columns.width / self._unit[columns.channel], np.inf)
-        share = self._longest(columns)
-        share = share._replace(
-            limit=share.limit + np.where(share.limit < 0, 0, int(self.off > 0.0))
-        )
-        master.add(
-            self._costs(columns.channel, columns.t), self._coefficients(columns), most, share
-        )
+        costs, shares = self._costs(columns.channel, columns.t), self._longest(columns)
+        master.add(costs, self._coefficients(columns), most, shares)
 
     def _longest(self, columns: ProgramColumns) -> Shares:
         """Shares in the limits, one per burn, that hold its on-time, over the longest that its
@@ -308,7 +300,8 @@ class Program:
         longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
         bounded = (columns.burn >= 0) & np.isfinite(longest)
         limit = np.full(len(longest), -1)
-        limit[bounded] = np.unique(columns.burn[bounded], return_inverse=True)[1]
+        # After that of the ring.
+        limit[bounded] = np.unique(columns.burn[bounded], return_inverse=True)[1] + (self.off > 0.0)
         return Shares(limit, self._unit[columns.channel] / longest)
 
     def _costs(self, channel: NDArray[np.int_], times: Vector) -> Vector:
@@ -318,16 +311,7 @@ class Program:
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
         """Coefficients of one unit of each column, (equations, n)."""
-        # Once slots were looked at as often as there are any, all of them are, and kept.
-        slots = columns.width > 0.0
-        self._looked += int(np.count_nonzero(slots))
-        if self._grid is None and self._looked <= len(self.centres):
-            rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
-        else:
-            rows = np.empty((len(slots), len(self.influence.goal), 3))
-            rows[slots] = self._slot_rows()[:, :, self._slot(columns.t[slots])].transpose(2, 0, 1)
-            if not slots.all():
-                rows[~slots] = self.influence.rows(columns.t[~slots])
+        rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
         return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
 
     def _slot_rows(self) -> Vector:
@@ -339,20 +323,13 @@ class Program:
             )
         return self._grid
 
-    def _worth(self, weights: Vector) -> Vector:
-        """Worth of one unit of each channel in each slot by prices ``weights``, (channels,
-        slots).
-        """
-        worth = self._direction @ (weights @ self._slot_rows().reshape(len(weights), -1)).reshape(
-            3, -1
-        )
-        if self.forbidden.any():
-            worth[self.forbidden] = -np.inf
-        return np.asarray(worth)
-
     def _gains(self, weights: Vector) -> Vector:
-        """Worth of one unit of each channel in each slot, less its cost, (channels, slots)."""
-        gains = self._worth(weights)
+        """Worth of one unit of each channel in each slot by prices ``weights``, less its cost,
+        (channels, slots).
+        """
+        worth = weights @ self._slot_rows().reshape(len(weights), -1)
+        gains = np.asarray(self._direction @ worth.reshape(3, -1))
+        gains[self.forbidden] = -np.inf
         every = np.arange(len(self.channels))[:, None]
         # Large: in place, and with one time where none is dearer.
         gains -= self._costs(every, self.centres if self.haste else self.centres[:1])
@@ -373,18 +350,6 @@ class Program:
         )
         return supplies(
             most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale
-        )
-
-    def _out_of_reach(self, weights: Vector) -> bool:
-        """True where prices ``weights`` prove that all slots together do not supply the goal
-        (Farkas' lemma).
-        """
-        if self.strong.any():  # these act at moments, of which the slots are only samples
-            return False
-        most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
-        loose = self.off / self._scale * float(np.linalg.norm(weights[2:4]))
-        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * float(
-            np.abs(weights).max()
         )
 
     def _first(self) -> ProgramColumns:
@@ -491,17 +456,10 @@ class Program:
         return np.asarray(np.clip(slot, 0, len(self.centres) - 1))
 
 
-Way = tuple[Literal["simplex", "ipm"], bool]
-SIMPLEX: Way = ("simplex", False)
-INTERIOR: Way = ("ipm", True)
-# Method and presolving: where the dual simplex loses its way, interior points, which do not know
-# the trouble, mostly find the solution. Presolving compares each unknown with all others: 75,000 in
-# two equations take 13 s, and 0.24 s without it (nutation of 89.9°, 64 times the horizon).
-INTERIOR_OF_MANY: Way = ("ipm", False)
-
-# Unknowns above which `INTERIOR_OF_MANY` comes first: a step of the dual simplex then passes
-# thousands of their bounds, at a time that grows with the square of their number, where interior
-# points take 0.4 s instead of 10 s for 75,000.
+# Unknowns above which interior points come first: a step of the dual simplex then passes thousands
+# of their bounds, at a time that grows with the square of their number, where interior points take
+# 0.4 s instead of 10 s for 75,000. Nothing is presolved: that compares each unknown with all
+# others, 13 s for as many in two equations (nutation of 89.9°, 64 times the horizon).
 LARGE = 10_000
 
 MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
@@ -543,7 +501,6 @@ class GrowingProgram:
 
     def __init__(self, right: Vector, limits: Vector, level: Vector) -> None:
         self._level = level
-        self._costs = np.zeros(0)
         self._highs = _SilentSolver()
         least = np.concatenate([right / level, np.full(len(limits), -highspy.kHighsInf)])
         for lower, upper in zip(
@@ -568,7 +525,6 @@ class GrowingProgram:
             row = np.concatenate([row, len(self._level) + shares.limit[limited]])[order]
             values = np.concatenate([values, shares.share[limited]])[order]
         starts = np.searchsorted(column, np.arange(len(cost))).astype(np.int32)
-        self._costs = np.concatenate([self._costs, cost])
         zeros = np.zeros(len(cost))
         self._highs.addCols(
             len(cost), cost, zeros, most, len(values), starts, row.astype(np.int32), values
@@ -580,22 +536,22 @@ class GrowingProgram:
         self._highs.addRow(-highspy.kHighsInf, most, len(used), used.astype(np.int32), row[used])
 
     def optimum(self) -> Optimum | None:
-        """The cheapest solution, from the last one's basis if there is one; None where no way of
-        solving succeeds.
+        """The cheapest solution, from the last one's basis if there is one; None where there is
+        none.
+
+        Where the simplex loses its way, interior points, which do not know the trouble, mostly find
+        the solution, and where they fail the simplex does.
         """
-        first, second = SIMPLEX, INTERIOR
-        if len(self._costs) > LARGE:
-            first, second = INTERIOR_OF_MANY, SIMPLEX
-        optimum = self._solved(*first)
+        first, second = ("simplex", "ipm")[:: 1 if self._highs.getNumCol() <= LARGE else -1]
+        optimum = self._solved(first)
         if optimum is None:
             self._highs.clearSolver()
-            optimum = self._solved(*second)
+            optimum = self._solved(second)
         return optimum
 
-    def _solved(self, method: str, presolve: bool) -> Optimum | None:
+    def _solved(self, method: str) -> Optimum | None:
         highs = self._highs
         highs.setOptionValue("solver", method)
-        highs.setOptionValue("presolve", "on" if presolve else "off")
         work.spend(self.charge * max(highs.getNumNz() - SMALL, 0))
         if highs.run() == highspy.HighsStatus.kError:
             # Threads are set once in a process, by whoever solves first; zero takes what there is.
@@ -615,6 +571,7 @@ class _SilentSolver(highspy.Highs):
         highspy.Highs.__init__(self)
         self.setOptionValue("output_flag", False)
         self.setOptionValue("threads", 1)
+        self.setOptionValue("presolve", "off")
         self.setOptionValue("parallel", "off")
         for way in ("simplex", "ipm"):
             self.setOptionValue(f"{way}_iteration_limit", MOST_STEPS)

@@ -23,8 +23,8 @@ from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.refinement import EndEquations, small_angles
-from nutdamp.schemes.sequential import NO_AXIAL, at_hand
-from nutdamp.spacecraft.constraints import usable
+from nutdamp.schemes.sequential import NO_AXIAL
+from nutdamp.spacecraft.constraints import at_hand, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_pulse
@@ -42,15 +42,13 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
     """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and
     may grow.
     """
-    few = len(solution.burns) <= 2 * len(program.influence.goal)
-    most = max(cost, solution.cost) * (1.0 + (GAIN if few else THRIFT))
     order = sorted(solution.burns, key=lambda burn: -burn.impulse)
-    best = solution
-    low = 1
-    high = len(order)
-    allowed = program.spacecraft.limits.max_pulses
-    if fewest or (allowed is not None and high > allowed):
+    few = len(order) <= 2 * len(program.influence.goal)
+    most = max(cost, solution.cost) * (1.0 + (GAIN if few else THRIFT))
+    if fewest or len(order) > (program.spacecraft.limits.max_pulses or math.inf):
         most = math.inf
+    best = solution
+    low, high = 1, len(order)
     while low < high and not work.exhausted():
         middle = (low + high) // 2
         trial = program.solve(program.about(order[:middle]))
@@ -69,25 +67,18 @@ def repaired(program: Program, solution: Solution) -> Solution | None:
     not help either.
     """
     allowed = program.forbidden.copy()
-    kept = _repaired(program, solution)
-    if kept is None:
-        program.forbidden = allowed
-        kept = _repaired(program, program.solve()) if _divide(program, solution.burns) else None
-    return kept
-
-
-def _repaired(program: Program, solution: Solution) -> Solution | None:
-    """The solution with what breaks a limit moved to other slots."""
+    attempt = solution
     for _ in range(REPAIRS):
-        if solution.unmet > UNMET or work.exhausted():
-            return None
-        broken = broken_by(program, solution.burns)
+        if attempt.unmet > UNMET or work.exhausted():
+            break
+        broken = broken_by(program, attempt.burns)
         if broken is None:
-            return solution
+            return attempt
         program.forbid(*broken)
-        near = program.solve(program.about(solution.burns))
-        solution = near if near.unmet <= UNMET else program.solve()
-    return None
+        near = program.solve(program.about(attempt.burns))
+        attempt = near if near.unmet <= UNMET else program.solve()
+    program.forbidden = allowed
+    return repaired(program, program.solve()) if _divide(program, solution.burns) else None
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
@@ -205,11 +196,6 @@ class Problem:
         """The schedule through its real pulse widths; what was flown before is remembered."""
         return propagation.flown(self.spacecraft, schedule, dynamics=self._dynamics)
 
-    @property
-    def closed(self) -> bool:
-        """True where nothing acts between pulses."""
-        return not (self.spacecraft.disturbances or self.spacecraft.growth)
-
     def program(
         self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None
     ) -> Program:
@@ -221,21 +207,13 @@ class Problem:
     @property
     def off(self) -> float:
         """Distance from its target, N m s, at which H may end."""
-        spacecraft = self.spacecraft
-        axial = float(
-            abs(
-                spacecraft.inertia.axial(
-                    spacecraft.spin if spacecraft.goal.spin is None else spacecraft.goal.spin
-                )
-            )
-        )
-        if (
-            not spacecraft.inertia.symmetric
-        ):  # what is along axis 3 swings, and is to be enough at its least
-            axial = min(
-                axial, float(np.linalg.norm(spacecraft.momentum)) * math.cos(spacecraft.nutation)
-            )
-        return axial * math.sin(min(self.options.shift or 0.0, 0.5 * math.pi))
+        spacecraft, goal = self.spacecraft, self.spacecraft.goal
+        axial = abs(spacecraft.inertia.axial(spacecraft.spin if goal.spin is None else goal.spin))
+        if not spacecraft.inertia.symmetric:
+            # What is along axis 3 swings, and is to be enough at its least.
+            size = float(np.linalg.norm(spacecraft.momentum))
+            axial = min(axial, size * math.cos(spacecraft.nutation))
+        return float(axial) * math.sin(min(self.options.shift or 0.0, 0.5 * math.pi))
 
     def within(self, horizon: float) -> Spacecraft:
         """The spacecraft with another horizon."""
@@ -287,9 +265,13 @@ class Problem:
         """Lower bound of the cost of schedules that leave no more than this one; None where none is
         known.
         """
-        left = self.leaves(self.flown(schedule))
-        cost = self.price(schedule)
-        return bounds.rigorous(self.spacecraft, self.prices, cost, left, shift=self.equations.shift)
+        return bounds.rigorous(
+            self.spacecraft,
+            self.prices,
+            self.price(schedule),
+            self.leaves(self.flown(schedule)),
+            shift=self.equations.shift,
+        )
 
     def price(self, schedule: Schedule) -> float:
         """Cost of a schedule by the program's own prices."""

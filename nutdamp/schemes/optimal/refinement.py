@@ -311,128 +311,115 @@ WAYS = np.array(
 )  # a step: of the start, of the on-time
 
 
-class Refinement:
+def refined(
+    flight: Flight, equations: EndEquations, aside: Vector, fly: Callable[[Schedule], Flight]
+) -> Schedule:
     """The schedule of a ``flight`` with its pulses moved and lengthened, as little as it takes, to
-    meet ``equations``.
+    leave least of the ``equations``; how little is for the caller to judge.
 
     ``fly`` flies schedules of its spacecraft; ``aside`` (equations,) N m s is to be left of them.
-    Settings x are (c1, τ1, c2, τ2 …) s, with their scale and how far each may go.
     """
+    spacecraft, schedule = flight.spacecraft, flight.schedule
+    size = float(np.linalg.norm(spacecraft.momentum))
+    names = {channel.name: channel for channel in spacecraft.channels}
+    channels = [names[pulse.channel] for pulse in schedule]
+    begun, latest = np.array(rooms(spacecraft, schedule.pulses)).reshape(-1, 2).T
+    shortest = np.array([channel.min_on_time for channel in channels])
+    longest = np.array([channel.max_on_time for channel in channels])
+    useful = np.array([longest_on_time(spacecraft, channel) for channel in channels])
+    t = np.array([pulse.t for pulse in schedule])
+    on = np.array([pulse.on_time for pulse in schedule])
+    edges = np.array([(pulse.start, pulse.end) for pulse in schedule]).reshape(-1, 2).T
+    before, after = np.maximum(edges[0] - begun, 0.0), np.maximum(latest - edges[1], 0.0)
+    # Settings (2k, 4): centre, then on-time, of each pulse, s, with its scale and its bounds.
+    pace = np.full(len(t), 1.0 / spacecraft.fastest)
+    centres = np.stack([t, pace, t - 0.5 * before, t + 0.5 * after], axis=-1)
+    most = np.maximum(np.minimum(useful, on + np.minimum(before, after)), on)
+    lengths = np.stack([on, np.minimum(on, pace), np.minimum(shortest, on), most], axis=-1)
+    settings = np.stack([centres, lengths], axis=1).reshape(-1, 4)
 
-    def __init__(
-        self,
-        flight: Flight,
-        equations: EndEquations,
-        aside: Vector,
-        fly: Callable[[Schedule], Flight],
-    ) -> None:
-        self.flight, self.equations, self.aside, self.fly = flight, equations, aside, fly
-        spacecraft, schedule = flight.spacecraft, flight.schedule
-        self.size, self.windows = float(np.linalg.norm(spacecraft.momentum)), Windows(spacecraft)
-        names = {channel.name: channel for channel in spacecraft.channels}
-        pace = 1.0 / spacecraft.fastest
-        self.channels = [names[pulse.channel] for pulse in schedule]
-        self.room = rooms(spacecraft, schedule.pulses)
-        self.bounds = [(channel.min_on_time, channel.max_on_time) for channel in self.channels]
-        settings = []
-        for pulse, channel, (begun, latest) in zip(schedule, self.channels, self.room, strict=True):
-            t = pulse.t
-            on = pulse.on_time
-            before = max(pulse.start - begun, 0.0)
-            after = max(latest - pulse.end, 0.0)
-            settings.append((t, pace, t - 0.5 * before, t + 0.5 * after))
-            most = min(longest_on_time(spacecraft, channel), on + min(before, after))
-            settings.append((on, min(on, pace), min(channel.min_on_time, on), max(most, on)))
-        self.start, self.scale, self.lower, self.upper = np.array(settings).reshape(-1, 4).T.copy()
+    def made(x: Vector) -> Schedule:
+        pairs = zip(channels, x.reshape(-1, 2).tolist(), strict=True)
+        return replace(
+            schedule, pulses=tuple(channel_pulse(channel, t, on) for channel, (t, on) in pairs)
+        )
 
-    def schedule(self, x: Vector) -> Schedule:
-        """The schedule with these settings."""
-        pairs = zip(self.channels, x.reshape(-1, 2).tolist(), strict=True)
-        pulses = tuple(channel_pulse(channel, t, on) for channel, (t, on) in pairs)
-        return replace(self.flight.schedule, pulses=pulses)
+    def left(flight: Flight) -> Vector:
+        return (misses(flight, equations) - aside) / size
 
-    def left(self, flight: Flight) -> Vector:
-        """Misses of a flight beyond what is to be left, (equations,), over |H|."""
-        return (misses(flight, self.equations) - self.aside) / self.size
-
-    def slopes(self, flight: Flight) -> Vector:
-        """Slopes of what is left by the scaled parameters, (equations, 2k)."""
+    def slopes(flight: Flight) -> Vector:
+        """Slopes of what is left by the settings, per s, (equations, 2k)."""
         columns = []
         times = np.array([(pulse.start, pulse.end) for pulse in flight.schedule]).T
-        edges = (_rows(flight, self.equations, each) for each in times)
-        for begin, end, channel in zip(*edges, self.channels, strict=True):
-            on, off = begin @ channel.torque, end @ channel.torque
-            columns += [off - on, 0.5 * (on + off)]
-        return np.asarray(np.column_stack(columns) * self.scale / self.size)
+        sides = (_rows(flight, equations, each) for each in times)
+        for begin, end, channel in zip(*sides, channels, strict=True):
+            first, last = begin @ channel.torque, end @ channel.torque
+            columns += [last - first, 0.5 * (first + last)]
+        return np.asarray(np.column_stack(columns) / size)
 
-    def refined(self) -> Schedule:
-        """The schedule that leaves least; how little is for the caller to judge."""
-        x = solve(
-            lambda x: self.left(self.fly(self.schedule(x))),
-            np.column_stack([self.start, self.scale, self.lower, self.upper]),
-            lambda: False,
-            lambda _x, _value: self.slopes(self.flight),
-        )
-        tick = self.windows.limits.tick
-        return self.schedule(x) if tick is None else self._on_ticks(x, tick)
+    scale = settings[:, 1]
+    x = solve(
+        lambda x: left(fly(made(x))),
+        settings,
+        lambda: False,
+        lambda _x, _value: slopes(flight) * scale,
+    )
+    windows = Windows(spacecraft)
+    tick = windows.limits.tick
+    if tick is None:
+        return made(x)
 
-    def _on_ticks(self, x: Vector, tick: float) -> Schedule:
-        """The schedule of least misses on ticks, by linear models one after the other; settings x
-        are exact.
-        """
-        centres, needed = x.reshape(-1, 2).T
-        on_times = [
-            self.windows.on_time(on, *bounds)
-            for on, bounds in zip(needed, self.bounds, strict=True)
-        ]
-        exact = np.column_stack([centres - 0.5 * needed, needed]) / tick
-        ticks = np.rint(np.column_stack([exact[:, 0], np.array(on_times) / tick]))
-        best, least = self.flight, np.inf
-        for _ in range(MODELS):
-            settings = tick * np.ravel(
-                np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]])
-            )
-            flight = self.fly(self.schedule(settings))
-            missing = self.left(flight)
-            size = float(np.linalg.norm(missing))
-            if size >= least:
-                break
-            best, least = flight, size
-            ticks = self._stepped(ticks, exact, tick, missing, self.slopes(flight) / self.scale)
-        return best.schedule
+    # The schedule of least misses on ticks, by linear models one after the other.
+    middles, needed = x.reshape(-1, 2).T
+    exact = np.column_stack([middles - 0.5 * needed, needed]) / tick
+    on_times = map(windows.on_time, needed, shortest, longest)
+    ticks = np.rint(np.column_stack([exact[:, 0], np.array(list(on_times)) / tick]))
 
-    def _stepped(
-        self, ticks: Vector, exact: Vector, tick: float, missing: Vector, slopes: Vector
-    ) -> Vector:
-        """Ticks (k, 2) near the ``exact`` ones that leave less, where these leave ``missing``;
-        ``slopes`` per s.
-        """
-        (begun, latest), (shortest, longest) = np.array(self.room).T, np.array(self.bounds).T
+    def allowed(ticks: Vector) -> NDArray[np.bool_]:
+        start, on_time = tick * ticks.T
+        near = np.abs(ticks - exact).max(axis=1) < REACH
+        inside = near & (start >= begun - TOUCHING) & (start + on_time <= latest + TOUCHING)
+        bounded = (on_time >= shortest - TOUCHING) & (on_time <= longest + TOUCHING)
+        return np.asarray(inside & bounded & (on_time > 0.5 * tick))
 
-        def allowed(ticks: Vector) -> NDArray[np.bool_]:
-            start, on_time = tick * ticks.T
-            near = np.abs(ticks - exact).max(axis=1) < REACH
-            inside = near & (start >= begun - TOUCHING) & (start + on_time <= latest + TOUCHING)
-            bounded = (on_time >= shortest - TOUCHING) & (on_time <= longest + TOUCHING)
-            return np.asarray(inside & bounded & (on_time > 0.5 * tick))
+    best, least = flight, np.inf
+    for _ in range(MODELS):
+        trial = fly(made(tick * np.ravel(ticks @ [[1.0, 0.0], [0.5, 1.0]])))
+        missing = left(trial)
+        if np.linalg.norm(missing) >= least:
+            break
+        best, least = trial, float(np.linalg.norm(missing))
+        ticks = _stepped(ticks, missing, tick * slopes(trial), allowed)
+    return best.schedule
 
-        ticks = ticks.copy()
-        for _ in range(TICK_STEPS):
-            way, pulse = np.nonzero([allowed(ticks + way) for way in WAYS])
-            if not len(pulse):
-                break
-            start, on_time = WAYS[way].T
-            centre = start + 0.5 * on_time
-            changes = tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
-            alone = missing[:, None] + changes
-            pairs = np.linalg.norm(alone[:, :, None] + changes[:, None, :], axis=0)
-            # Two steps of one pulse might leave its room; on the diagonal is the single step.
-            pairs[pulse[:, None] == pulse[None, :]] = np.inf
-            np.fill_diagonal(pairs, np.linalg.norm(alone, axis=0))
-            row, column = divmod(int(np.argmin(pairs)), len(pulse))
-            if pairs[row, column] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
-                break
-            for index in {row, column}:
-                ticks[pulse[index]] += WAYS[way[index]]
-                missing = missing + changes[:, index]
-        return ticks
+
+def _stepped(
+    ticks: Vector,
+    missing: Vector,
+    slopes: Vector,
+    allowed: Callable[[Vector], NDArray[np.bool_]],
+) -> Vector:
+    """Ticks (k, 2) of starts and on-times that leave less, where these leave ``missing``.
+
+    ``slopes`` (equations, 2k) per tick of centres and on-times.
+    """
+    ticks = ticks.copy()
+    for _ in range(TICK_STEPS):
+        way, pulse = np.nonzero([allowed(ticks + way) for way in WAYS])
+        if not len(pulse):
+            break
+        start, on_time = WAYS[way].T
+        centre = start + 0.5 * on_time
+        changes = slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time
+        alone = missing[:, None] + changes
+        pairs = np.linalg.norm(alone[:, :, None] + changes[:, None, :], axis=0)
+        # Two steps of one pulse might leave its room; on the diagonal is the single step.
+        pairs[pulse[:, None] == pulse[None, :]] = np.inf
+        np.fill_diagonal(pairs, np.linalg.norm(alone, axis=0))
+        row, column = divmod(int(np.argmin(pairs)), len(pulse))
+        if pairs[row, column] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
+            break
+        for index in {row, column}:
+            ticks[pulse[index]] += WAYS[way[index]]
+            missing = missing + changes[:, index]
+    return ticks

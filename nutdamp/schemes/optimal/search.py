@@ -21,14 +21,14 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible, NotFound
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions
-from nutdamp.schemes.optimal import alternatives, multistart
+from nutdamp.schemes.optimal import alternatives, multistart, refinement
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem, as_pulses, repaired, thinned
-from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, Refinement, along, misses
-from nutdamp.schemes.sequential import LATEST, bounded_by, why
+from nutdamp.schemes.optimal.refinement import MOST_GROWN, EndEquations, along, misses
+from nutdamp.schemes.sequential import LATEST, why
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
+from nutdamp.spacecraft.constraints import bounded_by, keeps_limits, rounded_off, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.roles import with_limits
@@ -105,7 +105,7 @@ class Search(Problem):
         program of small angles by its share.
         """
         symmetric = self.spacecraft.inertia.symmetric
-        attempts: list[tuple[float, Attempt]] = [
+        attempts: list[tuple[float, Callable[[Search, Schedule | None], Schedule | None]]] = [
             (ALWAYS, by_program),
             (DEARER, by_shorter_programs),
             # With three moments small angles mislead sooner. No other plan is to be better: that
@@ -117,7 +117,7 @@ class Search(Problem):
         # Infinite where the solver gave up, or the work for it was spent.
         if symmetric and UNMET < self.first.unmet < math.inf:
             attempts = attempts[3:]
-        best = None
+        best: Schedule | None = None
         for share, attempt in attempts:
             # Other schemes need little: they are asked even where a program of many slots took all
             # the work, as that of weak-doubled does, which one-pulse meets.
@@ -132,10 +132,9 @@ class Search(Problem):
 
     def proved(self, schedule: Schedule | None, share: float) -> bool:
         """True where a schedule costs at most that ``share`` more than the rigorous bound."""
-        proof = None if schedule is None else self.rigorous(schedule)
-        if schedule is None or proof is None:
-            return False
-        return self.price(schedule) <= proof * (1.0 + share)
+        return schedule is not None and self.price(schedule) <= (1.0 + share) * (
+            self.rigorous(schedule) or 0.0
+        )
 
     def astray(self, schedule: Schedule | None) -> bool:
         """True where there is no schedule, or one that, rounded to ticks, shifts H by more than it
@@ -180,7 +179,7 @@ class Search(Problem):
         and no more.
         """
         aside = np.array([0.0, 0.0, *off, 0.0])[self.equations.chosen]
-        return Refinement(flight, self.equations, aside, self.flown).refined()
+        return refinement.refined(flight, self.equations, aside, self.flown)
 
     def corrected(self, program: Program, solution: Solution) -> list[Schedule]:
         """Schedules from the burns of a solution, corrected along one flight after the other,
@@ -194,27 +193,27 @@ class Search(Problem):
             commandable = repaired(program, solution)
             if commandable is None:
                 break
-            solution = commandable
-            flown = self.flown(as_pulses(self.spacecraft, solution.burns))
+            flown = self.flown(as_pulses(self.spacecraft, commandable.burns))
             program.aim(along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
-                schedule = self.refined(flown, solution.off)
+                schedule = self.refined(flown, commandable.off)
                 schedules.append(schedule)
-                price = self.price(schedule) if self.error(schedule) == 0.0 else math.inf
-                if math.isfinite(price) and (
-                    not self.dear(schedule, DEAR) or price > (1.0 - SETTLED) * last
-                ):
-                    break
+                price = math.inf
+                if self.error(schedule) == 0.0:
+                    price = self.price(schedule)
+                    if not self.dear(schedule, DEAR) or price > (1.0 - SETTLED) * last:
+                        break
                 last = price
-            solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
+            solution = program.solve(program.about(commandable.burns, zoom=2.0**turn))
         return schedules
 
     def lowered(self, schedule: Schedule | None) -> Schedule | None:
         """The schedule after some steps down on the true motion, where that is known in closed form
         between pulses.
         """
-        ticks = self.spacecraft.limits.tick is not None
-        if schedule is None or not len(schedule) or not self.closed or ticks or work.exhausted():
+        body = self.spacecraft
+        settled = body.disturbances or body.growth or body.limits.tick is not None
+        if schedule is None or not len(schedule) or settled or work.exhausted():
             return schedule
         other = multistart.cheapened(self.task(), schedule)
         if (
@@ -252,11 +251,7 @@ class Search(Problem):
         return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
 
-# One way to a schedule that costs less than the best one before, if there is one.
-Attempt = Callable[[Search, Schedule | None], Schedule | None]
-
-
-def by_program(search: Search, _: Schedule | None) -> Schedule | None:
+def by_program(search: Search, _: Schedule | None = None) -> Schedule | None:
     """From one choice of burns of the linear program or another."""
     program = search.program()
     program.haste = HASTE
@@ -286,17 +281,17 @@ def by_shorter_programs(search: Search, best: Schedule | None) -> Schedule | Non
     shortest = max(shortest_on_time(spacecraft, channel) for channel in search.channels)
     least = spacecraft.limits.earliest + max(spacecraft.inertial_period, shortest)
     shares = (0.5,) if spacecraft.inertia.symmetric else (0.5, 0.75, 0.625)
-    for attempt, share in enumerate(shares):
-        horizon = share * spacecraft.horizon
-        halvings = 1
-        while horizon > least and search.dear(best, DEARER) and not work.exhausted():
-            shorter = search.until(horizon)
-            if (best is not None and halvings > HALVINGS) or not shorter.feasible(horizon):
+    for share in shares:
+        for halvings in itertools.count():
+            horizon = share * 0.5**halvings * spacecraft.horizon
+            looked = best is not None and halvings >= HALVINGS
+            if horizon <= least or looked or not search.dear(best, DEARER) or work.exhausted():
                 break
-            best = search.cheaper(best, by_program(shorter, None))
-            horizon *= 0.5
-            halvings += 1
-        if attempt == 0 and best is not None:
+            shorter = search.until(horizon)
+            if shorter.first.unmet > UNMET:
+                break
+            best = search.cheaper(best, by_program(shorter))
+        if best is not None:
             break
     return best
 
@@ -336,24 +331,18 @@ def by_descent(search: Search, best: Schedule | None) -> Schedule | None:
     strong = float(np.min(task.unit)) <= STRONG * period
     if UNMET < search.first.unmet < math.inf:  # at large angles H may be brought there all the same
         doubtful = short
-    elif best is None:
-        doubtful = True
     else:
-        doubtful = strong and (short or search.dear(best, DEARER))
-        doubtful = doubtful and not search.proved(best, PROVED)
+        hopeful = strong and (short or search.dear(best, DEARER))
+        doubtful = best is None or (hopeful and not search.proved(best, PROVED))
     if not doubtful:
         return search.lowered(best)
-    every = multistart.schedules(task, () if best is None else (best,))
-    schedules = [each for each in every if keeps_limits(spacecraft, each.pulses)]
+    schedules = multistart.schedules(task, () if best is None else (best,))
     if spacecraft.limits.tick is not None:
-        schedules = []
-        for flight in map(search.flown, every[:WAYS]):
-            off = misses(flight, search.equations)[2:4]
-            loose = search.options.shift is not None
-            rounded = search.refined(flight, off if loose else np.zeros(2))
-            if keeps_limits(spacecraft, rounded.pulses):
-                schedules.append(rounded)
-    return search.best(schedules)
+        loose = search.options.shift is not None
+        exact = [search.flown(each) for each in schedules[:WAYS]]
+        offs = (misses(each, search.equations)[2:4] if loose else np.zeros(2) for each in exact)
+        schedules = list(map(search.refined, exact, offs))
+    return search.best([each for each in schedules if keeps_limits(spacecraft, each.pulses)])
 
 
 def by_more_pulses(search: Search, best: Schedule | None) -> Schedule | None:
@@ -368,9 +357,8 @@ def by_more_pulses(search: Search, best: Schedule | None) -> Schedule | None:
         return None
     corrected = search.corrected(program, program.solve(program.about(longest)))
     more = search.lowered(search.best(corrected))
-    if more is None or search.price(best) <= search.price(more) * (1.0 + SAVED):
-        return None
-    return more
+    saves = more is not None and search.price(best) > search.price(more) * (1.0 + SAVED)
+    return more if saves else None
 
 
 def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
@@ -416,12 +404,9 @@ def least_cost(search: Search) -> Schedule:
             and strict.first.unmet <= UNMET
             and strict.first.cost > search.price(best) * (1.0 + SAVED)
         )
-        if astray or not hopeless:
-            keeping = strict.cheapest()
-            if astray and not search.astray(keeping):
-                best = keeping
-            else:
-                best = search.cheaper(best, keeping)
+        keeping = strict.cheapest() if astray or not hopeless else None
+        better = astray and not search.astray(keeping)
+        best = keeping if better else search.cheaper(best, keeping)
     if best is None and search.first.unmet <= UNMET:
         best = search.nearly()
     if best is None:
@@ -484,7 +469,7 @@ def refusal(search: Search) -> Infeasible:
 
     def attempt(limited: Spacecraft) -> Schedule | None:
         other = Search(limited, search.options)
-        return by_program(other, None) if other.feasible(limited.horizon) else None
+        return by_program(other)
 
     cure = why(spacecraft, attempt)
     cures = [cure.text]
@@ -500,7 +485,7 @@ def refusal(search: Search) -> Infeasible:
                 break
         if search.equations.shift and spacecraft.goal.axis is None and not work.exhausted():
             free = Search(spacecraft, replace(search.options, free_axis=True, shift=None))
-            if by_program(free, None) is not None:
+            if by_program(free) is not None:
                 cures.append("with --free-axis a schedule exists")
     nutation = search.program(equations=EndEquations(shift=False)).solve().unmet
     plain = search.program(equations=EndEquations(shift=search.equations.shift))
@@ -571,10 +556,9 @@ def shortest(search: Search) -> Search:
     begin, horizon = search.spacecraft.limits.earliest, search.spacecraft.horizon
 
     def ends(end: float) -> bool:
-        shorter = search.until(end)
-        return shorter.first.unmet <= UNMET and by_program(shorter, None) is not None
+        return by_program(search.until(end)) is not None
 
-    if not search.feasible(horizon):
+    if search.first.unmet > UNMET:
         return search
     span = search.least_horizon(begin, horizon) - begin
     low = begin + span

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from support import places
 from support.builders import present
-from support.commands import DATED, WIDE, call, contents, refusals, result, written
+from support.commands import DATED, call, contents, refusals, result, written
 from support.golden import check_text
 from support.process import Run
 from support.telemetry import Array, motion
 
 import nutdamp
 from nutdamp.errors import BadRequest
-from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.reader import example_text
 from nutdamp.flight.propagation import flown
 from nutdamp.physics.thruster import Trapezoid
@@ -149,20 +148,6 @@ def test_the_picture_has_a_heading_and_shows_no_rounding_as_noise(run: Run, tmp_
     assert "only rounding: omega_2, omega_3" in picture
 
 
-def test_what_coarse_steps_do_to_an_estimate_is_in_its_sigma(run: Run, tmp_path: Path) -> None:
-    """The same record without steps has a nutation of 4.602 deg; with them it was 7 sigma off."""
-    run(
-        "fit",
-        str(places.case("fit-gyro-quant.csv")),
-        str(places.case("fit-sc.yaml")),
-        "--json",
-        "f.json",
-    )
-    nutation = estimates(tmp_path)["nutation"]
-    assert abs(nutation["value"] - 4.602) < 3.0 * nutation["sigma"] < 0.6
-    assert results(tmp_path)["kept"] == ["bias_omega_3"]
-
-
 def test_a_track_of_ideal_impulses_tells_what_they_do(run: Run, tmp_path: Path) -> None:
     """At an impulse it has two rows, of which neither is a sample; the first is at the start."""
     body = str(places.CONFIGS / "magnus-a03.yaml")
@@ -174,38 +159,6 @@ def test_a_track_of_ideal_impulses_tells_what_they_do(run: Run, tmp_path: Path) 
     assert rows["thrust steerable"]["value"] == pytest.approx(1.0, abs=1e-6)
     assert rows["C/A"]["value"] == pytest.approx(0.7, abs=1e-7)
     assert run("fit", "track.csv", body).returncode == 2
-
-
-def test_what_a_steady_spin_does_not_tell_is_as_the_file_has_it(run: Run, tmp_path: Path) -> None:
-    files = str(places.case("fit-steady-spin.csv")), str(places.case("fit-tiny.yaml"))
-    assert run("fit", *files, "--json", "f.json").returncode == 0
-    rows = estimates(tmp_path)
-    assert (rows["nutation"]["value"], rows["spin"]["value"]) == (
-        0.0,
-        pytest.approx(math.degrees(3.0)),
-    )
-    assert rows.keys().isdisjoint({"phase", "C/A"})
-    assert results(tmp_path)["kept"] == ["bias_omega_1", "bias_omega_2", "bias_omega_3"]
-    run(
-        "fit",
-        str(places.case("fit-steady-spin.csv")),
-        str(places.case("fit-sc.yaml")),
-        "--json",
-        "f.json",
-    )
-    assert not any("A and C +0.0000" in note["text"] for note in results(tmp_path)["notes"])
-
-
-def test_what_is_far_from_the_file_is_written_where_that_is_accepted(
-    run: Run, tmp_path: Path
-) -> None:
-    """Both values are said; a swapped column makes C/A another, and what follows from it."""
-    files = str(places.case("fit-gyro-swap12.csv")), str(places.case("fit-sc.yaml"))
-    assert run("fit", *files, "--accept", "-o", "now.yaml", "--json", "f.json").returncode == 0
-    far = next(note for note in results(tmp_path)["notes"] if note["code"] == "fit-far")
-    assert far["values"]["estimates"].startswith("C/A 1.32833 for 0.666667 (+3")
-    now = nutdamp.load(tmp_path / "now.yaml", set={"loop.start": "0.4 deg"}).inertia
-    assert pytest.approx(1.3283, abs=1e-4) == now.C / now.A
 
 
 @pytest.mark.parametrize(("spin", "said"), [(1.005, False), (1.03, True), (0.985, True)])
@@ -320,18 +273,6 @@ def test_the_library_gives_the_same_file_and_fits_it_again_with_what_was_known(
     assert after["A"].sigma == pytest.approx(before["A"].sigma, rel=0.01)
     assert after["A"].value == pytest.approx(before["A"].value, abs=0.05 * before["A"].sigma)
     assert after["C/A"].sigma == pytest.approx(before["C/A"].sigma / math.sqrt(2.0), rel=0.05)
-
-
-@pytest.mark.weekly
-def test_fit_plan_disperse_complies_where_the_blind_plan_does_not(run: Run, tmp_path: Path) -> None:
-    surely = ("-q", "--set", "requirement.probability=99.7%", "--json", "f.json")
-    assert run("disperse", *surely, *WIDE).returncode == 4
-    assert results(tmp_path)["requirement"]["met_fraction"] < 0.88
-    for seed in (3, 4):
-        flight(tmp_path, seed, wide=True)
-        fit(run, "flight.csv", "-q", "-o", "now.yaml", "--at", "90s", *WIDE)
-        run("disperse", "now.yaml", *surely, status=0)
-        assert results(tmp_path)["requirement"]["met_fraction"] >= 0.997
 
 
 @pytest.mark.weekly
@@ -477,15 +418,6 @@ def test_an_imported_schedule_is_simulated(run: Run, tmp_path: Path) -> None:
     assert shown.stdout == (tmp_path / "back.yaml").read_text()
     comments = re.sub("^[^#]*", "", shown.stdout, flags=re.MULTILINE)
     check_text("cli.import.shown", f"{comments}\n{shown.stderr}")
-
-
-def test_remarks_of_a_message_are_hidden_where_quiet(run: Run, tmp_path: Path) -> None:
-    written(tmp_path, a_apm=exported(run, "export dated.yaml --format apm --scheme none"))
-    written(tmp_path, b_apm=(tmp_path / "a.apm").read_text().replace("= UTC", "= TAI"))
-    (said,) = read_message(str(tmp_path / "b.apm")).remarks
-    loud, quiet = (call(run, f"import apm b.apm -o b.yaml{more}").stderr for more in ("", " -q"))
-    assert said in loud
-    assert said not in quiet
 
 
 def test_faults_of_a_message_are_reported_by_line(run: Run, tmp_path: Path) -> None:

@@ -22,7 +22,6 @@ from support.golden import check_text
 from support.process import Run
 from support.shown import downloaded, parsed
 
-from nutdamp import __version__
 from nutdamp.figures import image, style
 from nutdamp.flight.propagation import Flight
 from nutdamp.page import report
@@ -80,31 +79,6 @@ def test_plan_draws_the_recommended_plan_alone_and_simulate_another_figure(
     assert drawn["recommended.png"] == drawn["two.png"]
     assert drawn["cheapest.png"] == drawn["optimal.png"]
     assert len(set(drawn.values())) == 4
-
-
-@pytest.mark.weekly
-def test_disperse_draws_what_is_named(run: Run, tmp_path: Path) -> None:
-    texts = {
-        "cases": "cases within, %",
-        "momentum": "H towards you, inertial x to the right",
-    }
-    for figure in (*texts, "all"):
-        named = () if figure == "all" else ("--figure", figure)
-        run(
-            "disperse",
-            "--scheme",
-            "two-pulse",
-            "--samples",
-            "200",
-            "-q",
-            "--plot",
-            f"{figure}.svg",
-            *named,
-        )
-        drawn = (tmp_path / f"{figure}.svg").read_text(encoding="utf-8")
-        assert all(
-            text in drawn for text in (texts.values() if figure == "all" else [texts[figure]])
-        )
 
 
 @pytest.mark.deep
@@ -225,18 +199,6 @@ def verdict_of(folder: Path, kind: str) -> str:
     (decision,) = (node for node in tree.all("section") if node.attributes["id"] == "decision")
     assert decision.attributes["class"] == kind
     return decision.text
-
-
-@pytest.mark.weekly
-def test_a_page_of_the_example_tells_how_to_repeat_it(run: Run, tmp_path: Path) -> None:
-    ended = run("report", "--scheme", "two-pulse")
-    assert (ended.returncode, ended.stdout) == (0, "")
-    assert "built-in example" in ended.stderr
-    assert ended.stderr.endswith("wrote report.html\n")
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert '<pre>nutdamp report <span class="whole-word">--scheme</span> two-pulse</pre>' in page
-    assert f'<th scope="row">nutdamp</th><td>{__version__}</td>' in page
-    assert names(tmp_path) == ["report.html"]
 
 
 @pytest.mark.weekly

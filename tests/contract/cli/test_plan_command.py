@@ -1,8 +1,6 @@
 """``nutdamp plan``: screen, files and exit status of nominal and of robust plans."""
 
 import json
-import math
-import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -101,23 +99,6 @@ def test_json_and_csv_follow_the_contract_and_agree(run: Run, tmp_path: Path) ->
     assert float(table[0]["nutation_before_deg"]) == pytest.approx(
         data["spacecraft"]["nutation_deg"], rel=1e-9
     )
-
-
-def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None:
-    written(
-        tmp_path,
-        ideal_yaml="name: X\ninertia: {A: 120, C: 80}\nstate: {spin: 3, nutation: 10 deg}\n",
-    )
-    exact, literal = (
-        result(run, f"plan ideal.yaml --scheme two-pulse {flag}")["plans"][0]
-        for flag in ("", "--literal")
-    )
-    assert exact["residual"]["momentum_shift_deg"] < 1e-9
-    assert literal["residual"]["momentum_shift_deg"] == pytest.approx(
-        0.19, abs=0.005
-    )  # PHYSICS: 0.19° at 10°
-    first, second = (math.hypot(*pulse["impulse_Nms"]) for pulse in literal["pulses"])
-    assert first == pytest.approx(second, rel=1e-12)
 
 
 # --- targets, the Sun, the spin
@@ -219,30 +200,6 @@ def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(
-    ("degrees", "status"), [(3.0, "FLY four-pulse: "), (0.001, "NOT ENOUGH: robust: ")]
-)
-def test_the_requirement_with_its_probability(
-    run: Run, tmp_path: Path, degrees: float, status: str
-) -> None:
-    requirement = (
-        f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\nlimits: {{tick: 1 ms}}\n"
-    )
-    written(tmp_path, sat_yaml=CRAFTS["sat_yaml"] + requirement)
-    ended = run(
-        "plan",
-        "-v",
-        "sat.yaml",
-        "--scheme",
-        "four-pulse",
-        "--robust",
-        status=0 if status.startswith("FLY") else 4,
-    )
-    assert ended.stdout.startswith(f"Sat\n{status}")
-    assert re.search(r"[\d.]+ % of cases comply \(95 % required\)", words(ended.stdout))
-
-
-@pytest.mark.deep
 def test_the_plan_made_for_wide_tolerances_complies_where_no_scheme_does(run: Run) -> None:
     """85.6 % comply with two-pulse, the best; the cheapest plan that new cases confirm flies."""
     data = result(run, shlex.join(["plan", "--robust", *WIDE]))
@@ -254,24 +211,6 @@ def test_the_plan_made_for_wide_tolerances_complies_where_no_scheme_does(run: Ru
         plan["propellant_kg"] for plan in robust["candidates"] if plan["met_fraction"] >= 0.997
     ]
     assert robust["recommended"]["propellant_kg"] == min(enough) < max(enough)
-
-
-@pytest.mark.weekly
-def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(
-    run: Run, tmp_path: Path
-) -> None:
-    written(tmp_path, sat_yaml=CRAFTS["sat_yaml"])
-    options = ("--scheme", "optimal", "--target", "3deg,45deg", "--robust")
-    ended = run("plan", "-v", "sat.yaml", *options, "--json", "plan.json")
-    data = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
-    assert data["target"]["axis"] == pytest.approx({"tilt_deg": 3.0, "azimuth_deg": 45.0})
-    for plan in filter(None, (*data["candidates"], data["recommended"], data["against"])):
-        assert plan["final"]["momentum"]["tilt_deg"] == pytest.approx(3.0, abs=0.1)
-    assert data["recommended"]["final"] == data["recommended"]["plan"]["final"]
-    for row in ("H ends at", "target"):
-        assert re.search(
-            rf"^{row} +tilt 3\.0000 deg, azimuth 45\.0000 deg$", ended.stdout, re.MULTILINE
-        )
 
 
 # --- what is recommended: dispersed cases, command blocks, needless pulses, spin changes, free H
@@ -316,15 +255,3 @@ def test_the_cheapest_blocks(run: Run, name: str, settings: tuple[str, ...], mos
     ]
     assert plan["meets_requirement"] is True
     assert 1e3 * plan["propellant_kg"] <= most_g
-
-
-def test_the_axis_is_kept_where_something_asks_for_it(run: Run) -> None:
-    free = planned(
-        run, "--scheme", "optimal", "--nominal", "--set", "requirement={nutation: 0.5 deg}"
-    )["plans"][0]
-    kept = planned(run, "--scheme", "optimal", "--nominal")["plans"][0]
-    assert free["bounds"]["keeping"] == pytest.approx(kept["bounds"]["first_order"], rel=1e-6)
-    assert kept["bounds"]["keeping"] is None
-    assert kept["flown"]["momentum_shift_deg"] < 0.2
-    freed = planned(run, "--scheme", "optimal", "--nominal", "--free-axis")["plans"][0]
-    assert freed["propellant_kg"] <= kept["propellant_kg"] * 1.001

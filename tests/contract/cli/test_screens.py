@@ -52,14 +52,15 @@ def numbers(text: str) -> Counter[str]:
 
 @pytest.mark.weekly
 @spread("command", COMMANDS, quick=2, deep=2, ids=lambda command: command.split()[0])
-def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
-    """Columns that do not fit go on below, under the first one again."""
+def test_no_digit_is_lost_on_a_usual_screen_and_narrow_ones_name_what_they_leave_out(
+    run: Run, command: str
+) -> None:
     wide = call(run, f"{command} -q", columns=300)
-    for width in (25, 59, 60, 80):
-        narrow = call(run, f"{command} -q", columns=width, status=wide.returncode)
-        assert "…" not in narrow.stdout
-        assert numbers(narrow.stdout) >= numbers(wide.stdout)
-        assert max(map(len, narrow.stdout.splitlines())) <= width
+    for width in (25, 60, 80):
+        narrow = call(run, command, columns=width, status=wide.returncode).stdout
+        assert "…" not in narrow
+        assert numbers(narrow) >= numbers(wide.stdout) or (width < 80 and "left out:" in narrow)
+        assert max(map(len, narrow.splitlines())) <= width
 
 
 def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
@@ -71,25 +72,6 @@ def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
     for ended in (one, seven):
         assert ended.returncode == 0
         assert "FLY two-pulse:" in ended.stdout
-
-
-@pytest.mark.weekly
-@spread("name", ["ace", "single-thruster", "steerable-stage", "magnus-a03"], quick=1, deep=1)
-def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
-    usual = call(run, f"plan {places.CONFIGS}/{name}.yaml -v -q", columns=80).stdout
-    (comparison,) = (part for part in usual.split("\n\n") if "\nend, s" in part)
-    head, *lines = comparison.splitlines()
-    commanded = ["command-block"] if name == "ace" else []
-    assert head.split() == ["one-pulse", "two-pulse", "four-pulse", *commanded, "optimal"]
-    assert [line.split("  ")[0] for line in lines[:3]] == ["pulses", "end, s", "impulse, N m s"]
-
-
-def test_a_scheme_without_thrusters_says_so(run: Run) -> None:
-    """Long names of channels are broken."""
-    (verdicts,) = re.findall(
-        "^verdict .*?\n\n", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE | re.DOTALL
-    )
-    assert verdicts.split().count("no") == verdicts.split().count("thrusters") == 2
 
 
 # --- progress of long runs
@@ -193,19 +175,15 @@ def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
     ]
 
 
-@pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
 def test_no_progress_is_shown_in_a_pipe_or_where_it_is_not_wanted(
-    monkeypatch: pytest.MonkeyPatch,
-    clock: Clock,
-    lines: list[Any],
-    stream: io.StringIO,
-    quiet: bool,
+    monkeypatch: pytest.MonkeyPatch, clock: Clock, lines: list[Any]
 ) -> None:
-    monkeypatch.setattr(sys, "stderr", stream)
-    with main.working("planning", quiet=quiet), work.steps(2.0) as task:
-        task.reach(1.0)
-        clock.set(60.0)
-        assert (lines, clock.timers, stream.getvalue()) == ([], [], "")
+    for stream, quiet in ((io.StringIO(), False), (Terminal(), True)):
+        monkeypatch.setattr(sys, "stderr", stream)
+        with main.working("planning", quiet=quiet), work.steps(2.0) as task:
+            task.reach(1.0)
+            clock.set(60.0)
+            assert (lines, clock.timers, stream.getvalue()) == ([], [], "")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -297,11 +275,8 @@ def test_of_many_points_some_are_shown_the_first_and_the_last_among_them() -> No
     assert f"note[trade-points]: points on this screen: {ROWS} of 100" in shown
     every = printed(trade_screen(traded, verbose=True), WIDTH)
     assert sum(bool(re.match(r"\d+ .*FLY$", line)) for line in every) == 100
-
-
-def test_a_trade_without_a_schedule_says_why() -> None:
-    fronts = (Front(0.0, (), "no channel"),)
-    shown = "\n".join(printed(trade_screen(Trade(spinner(), fronts), verbose=False), WIDTH))
+    none = Trade(spinner(), (Front(0.0, (), "no channel"),))
+    shown = "\n".join(printed(trade_screen(none, verbose=False), WIDTH))
     assert "NO SCHEDULE" in shown
     assert "H ends where it was – none: no channel" in shown
 
@@ -340,34 +315,24 @@ LOOPED, DISPERSED = (
     [name for name in FILES if key in (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")]
     for key in ("\nloop:", "\ndispersions:")
 )
-SHORT = ["check -v", "simulate -v --scheme two-pulse --samples 100"]
-LONG = [
-    "plan --nominal",
-    "plan -v --nominal",
-    "simulate -v --scheme optimal",
-    "verify -v --scheme two-pulse",
-    "trade -v --points 2",
-]
-STUDIES = ["disperse --scheme two-pulse --case 3", "disperse -v --samples 500 --scheme two-pulse"]
-LOOPS = [
-    "loop -v --until 400s",
-    "budget -v",
-    "disperse -v --loop --samples 50",
-    "disperse --loop --samples 9 --case 3",
-    "verify --loop --set limits.horizon=300s",
-]
-FITS = [
-    f"fit -v {places.CASES}/{name}.csv {places.CASES}/{name}.yaml"
-    for name in ("accelerometer", "axis-tumble")
-]
+UNITED = [  # commands with the files that they take
+    *(f"{command} {places.CONFIGS}/{name}.yaml" for commands, names in (
+        (("check -v", "simulate -v --scheme two-pulse --samples 100"), FILES),
+        (("disperse --scheme two-pulse --case 3",
+          "disperse -v --samples 500 --scheme two-pulse"), DISPERSED),
+        (("plan --nominal", "plan -v --nominal", "simulate -v --scheme optimal",
+          "verify -v --scheme two-pulse", "trade -v --points 2"), FILES),
+        (("loop -v --until 400s", "budget -v", "disperse -v --loop --samples 50",
+          "disperse --loop --samples 9 --case 3",
+          "verify --loop --set limits.horizon=300s"), LOOPED),
+    ) for command in commands for name in names),
+    *(f"fit -v {places.CASES}/{name}.csv {places.CASES}/{name}.yaml"
+      for name in ("accelerometer", "axis-tumble")),
+]  # fmt: skip
 
 
-def of_configs(commands: list[str], names: list[str]) -> list[str]:
-    """Each of the commands with each of the files."""
-    return [f"{command} {places.CONFIGS}/{name}.yaml" for command in commands for name in names]
-
-
-def expect_replaced(run: Run, command: str) -> None:
+@spread("command", UNITED, quick=4, deep=8)
+def test_no_si_unit_with_a_us_one_is_left_on_a_screen(run: Run, command: str) -> None:
     """Each unit is replaced, and each number with one is its value in the other."""
     si, us = (call(run, f"{command} --units {name}", columns=200) for name in ("si", "us"))
     assert (us.returncode, si.stdout) == (si.returncode, call(run, command, columns=200).stdout)
@@ -383,17 +348,6 @@ def expect_replaced(run: Run, command: str) -> None:
         assert (us_unit, us_per, bool(other)) == (name, per, bool(number))
         if number:
             assert math.isclose(float(number), factor * float(other), rel_tol=6e-3, abs_tol=1e-9)
-
-
-@spread("command", [*of_configs(SHORT, FILES), *of_configs(STUDIES, DISPERSED)], quick=4, deep=8)
-def test_no_si_unit_with_a_us_one_is_left_on_a_screen(run: Run, command: str) -> None:
-    expect_replaced(run, command)
-
-
-@pytest.mark.weekly
-@pytest.mark.parametrize("command", [*of_configs(LONG, FILES), *of_configs(LOOPS, LOOPED), *FITS])
-def test_nor_on_the_screens_of_long_studies(run: Run, command: str) -> None:
-    expect_replaced(run, command)
 
 
 @pytest.mark.parametrize(

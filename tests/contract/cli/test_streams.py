@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import IO
 
 import pytest
 from support import places
@@ -42,28 +41,18 @@ LINUX = pytest.mark.skipif(
 )
 
 
-def process(
-    folder: Path, command: str, *, stdout: int | IO[str] = -1, **more: str
+def shell(
+    folder: Path, line: str, *arguments: str, **more: str
 ) -> subprocess.CompletedProcess[str]:
-    """A command as a process, with that standard output and more in its environment."""
+    """``$0 -m nutdamp`` in a shell, with more in its environment."""
+    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", **more}
     return subprocess.run(
-        [sys.executable, "-m", "nutdamp", *command.split()],
+        ["sh", "-c", line, sys.executable, *arguments],
         cwd=folder,
-        env={**os.environ, **more},
-        stdout=stdout,
-        stderr=subprocess.PIPE,
-        text=True,
+        env=environment,
+        capture_output=True,
         encoding="latin-1",
         check=False,
-    )
-
-
-def shell(folder: Path, call: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """``$0 -m nutdamp`` in a shell."""
-    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1"}
-    line = ["sh", "-c", call, sys.executable, *arguments]
-    return subprocess.run(
-        line, cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
 
 
@@ -76,28 +65,25 @@ def shell(folder: Path, call: str, *arguments: str) -> subprocess.CompletedProce
     "command", ["check -q", "plan -q", "plan -q --json -", "--help", "explain"], quick=1, deep=2
 )
 def test_a_full_standard_output_is_said_in_one_line(tmp_path: Path, command: str) -> None:
-    with FULL.open("w") as full:
-        ended = process(tmp_path, command, stdout=full)
+    ended = shell(tmp_path, f'exec "$0" -m nutdamp {command} >{FULL}')
     assert ended.returncode == 1
     assert re.fullmatch(r".*cannot write.*No space left.*\n", ended.stderr.removeprefix(BUILT_IN))
 
 
 @pytest.mark.deep
 @POSIX
-def test_a_process_without_standard_output_or_reader_does_its_work(tmp_path: Path) -> None:
+def test_a_process_without_standard_output_reader_or_greek_letters_does_its_work(
+    tmp_path: Path,
+) -> None:
     for command in ("plan --quiet", "plan --quiet --csv -"):
         closed = shell(tmp_path, f'exec "$0" -m nutdamp {command} --json pulses.json >&-')
         assert (closed.returncode, closed.stderr, names(tmp_path)) == (0, BUILT_IN, ["pulses.json"])
-    left = shell(
-        tmp_path, '"$0" -m nutdamp simulate --scheme none --samples 50000 --csv - | head -n 1'
-    )
+    track = '"$0" -m nutdamp simulate --scheme none --samples 50000 --csv - | head -n 1'
+    left = shell(tmp_path, track)
     assert left.stdout.startswith("t_s,")
     assert "Traceback" not in left.stderr
-
-
-@pytest.mark.deep
-def test_a_screen_without_greek_letters_gets_question_marks(tmp_path: Path) -> None:
-    ended = process(tmp_path, "check --quiet", PYTHONIOENCODING="latin-1", PYTHONUTF8="0")
+    latin = {"PYTHONIOENCODING": "latin-1", "PYTHONUTF8": "0"}
+    ended = shell(tmp_path, 'exec "$0" -m nutdamp check --quiet', **latin)
     assert (ended.returncode, ended.stderr) == (0, BUILT_IN)
     assert "A|?0|" in ended.stdout
 
@@ -225,10 +211,6 @@ def test_sigterm_while_a_file_is_written_leaves_what_was_there(tmp_path: Path) -
     assert contents(tmp_path) == {"x.csv": b"before"}
 
 
-# --- where nothing is feasible
-# ----------------------------------------------------------------------------------------
-
-
 # --- names that look like markup, control the terminal, or are not UTF-8
 # ----------------------------------------------
 
@@ -236,12 +218,6 @@ def test_sigterm_while_a_file_is_written_leaves_what_was_there(tmp_path: Path) -
 HOSTILE = "\x1b]0;PWNED\x07\x1b[2J\x9b31m"
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
 BODY = EXACT + "attitude: {quaternion: [1, 0, 0, 0], epoch: 2026-03-01T12:00:00Z, frame: EME2000}\n"
-
-
-def test_what_does_not_print_is_shown_as_its_escape() -> None:
-    assert visible("a\x1b[2Jb\x07\x7f\x9b\r\u202e\u2028") == r"a\x1b[2Jb\x07\x7f\x9b\r\u202e\u2028"
-    assert visible("two lines\nωθ° ×…\n") == "two lines\nωθ° ×…\n"
-    assert visible("not UTF-8: \udcff") == r"not UTF-8: \udcff"
 
 
 def test_no_control_character_of_a_name_a_unit_or_an_option_reaches_the_terminal(
@@ -287,6 +263,10 @@ def test_no_control_character_of_a_name_a_unit_or_an_option_reaches_the_terminal
             .replace(str(tmp_path), "")
         )
     check_text("cli.streams.hostile", said)
+    assert (
+        visible("a\x1b[2J\r\u202e\u2028\nωθ° ×…\udcff")
+        == r"a\x1b[2J\r\u202e\u2028" + "\nωθ° ×…" + r"\udcff"
+    )
     assert not CONTROL.search(run("plan", f"--{HOSTILE}").stderr)
     shown = run("check", f"good-{HOSTILE}\n.yaml", "--json", "-").stdout
     assert not CONTROL.search(shown)
@@ -524,13 +504,57 @@ USAGE = {
         )
     ],
     "examples": ["init --from lunar-prospecter", "init --from zzz"],
+    "empty": ["plan -", "simulate --schedule - -q", "import apm -"],
+}
+UNREACHABLE = {  # before the work, which would take hours for some
+    "unreachable": [
+        f"{command} --quiet"
+        for command in (
+            "plan missing.yaml",
+            "check missing.yaml",
+            "report missing.yaml",
+            "export missing.yaml --format apm",
+            "simulate --schedule missing.csv",
+            "import apm missing.apm",
+            "plan --json folder",
+            "plan --plot no/x.png",
+            "plan --csv no/such/x.csv",
+            "plan --csv no/x.csv",
+            "simulate --scheme none --json no/x.json",
+            "trade --points 1000 --csv no/x.csv",
+            "disperse --samples 1e10 --json no/x.json",
+            "animate -o no/x.gif --seconds 600",
+            "report -o no/x.html",
+            "export --format json -o no/x.json",
+            "export dated.yaml --format apm --scheme two-pulse -o no/x.apm",
+            "verify --json no/x.json",
+            "import apm empty.apm -o no/x.yaml",
+        )
+    ],
+    "devices": [
+        "check /dev/zero",
+        "plan /dev/full",
+        "simulate -q --schedule /dev/zero",
+        "import /dev/null",
+        "fit -q /dev/zero",
+    ],
 }
 
 
-@pytest.mark.parametrize("kind", USAGE)
-def test_a_bad_command_line_is_exit_2(run: Run, tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("kind", [*USAGE, *UNREACHABLE])
+def test_a_bad_command_line_is_exit_2_and_what_cannot_be_read_or_written_exit_1(
+    run: Run, tmp_path: Path, kind: str
+) -> None:
+    if kind == "devices" and not (FULL.exists() and Path("/dev/zero").exists()):
+        pytest.skip("no such device")
+    (tmp_path / "folder").mkdir()
     written(tmp_path, dated_yaml=DATED, pulses_csv=SCHEDULE)
-    check_text(f"cli.refused.{kind}", refusals(run, tmp_path, USAGE[kind]))
+    if kind == "unreachable":
+        message = run("export", "dated.yaml", "--format", "apm", "--scheme", "none").stdout
+        written(tmp_path, empty_apm=message)
+    commands = USAGE.get(kind) or UNREACHABLE[kind]
+    said = refusals(run, tmp_path, commands, 2 if kind in USAGE else 1, stdin="")
+    check_text(f"cli.refused.{kind}", said)
 
 
 TWICE = [
@@ -575,62 +599,18 @@ def test_one_file_for_two_purposes_is_exit_2(run: Run, tmp_path: Path) -> None:
 
 
 def test_what_is_no_file_may_be_named_twice_and_an_output_as_what_is_read_unnamed(run: Run) -> None:
-    ended = run(
-        "plan", "--scheme", "one-pulse", "--quiet", "--csv", os.devnull, "--json", os.devnull
-    )
-    assert (ended.returncode, ended.stderr) == (4, BUILT_IN)
-    assert (
-        run("plan", "--scheme", "two-pulse", "--quiet", "--csv", "spacecraft.yaml").returncode == 0
-    )
+    both = f"--csv {os.devnull} --json {os.devnull}"
+    ended = call(run, f"plan --scheme one-pulse --quiet {both}", status=4)
+    assert ended.stderr == BUILT_IN
+    call(run, "plan --scheme two-pulse --quiet --csv spacecraft.yaml", status=0)
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [["--csv", "out"], pytest.param(["--csv", "-", "--json", "out"], marks=pytest.mark.deep)],
-)
-def test_standard_output_is_a_purpose_too(tmp_path: Path, arguments: list[str]) -> None:
-    with (tmp_path / "out").open("w") as out:
-        command = [sys.executable, "-m", "nutdamp", "plan", *arguments]
-        ended = subprocess.run(
-            command, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, check=False
-        )
-    assert ended.returncode == 2
-    assert "goes to this file" in ended.stderr
-
-
-UNREACHABLE = [
-    "plan missing.yaml",
-    "check missing.yaml",
-    "report missing.yaml",
-    "export missing.yaml --format apm",
-    "simulate --schedule missing.csv",
-    "import apm missing.apm",
-    "plan --json folder",
-    "plan --plot no/x.png",
-    "plan --csv no/such/x.csv",
-    "plan --csv no/x.csv",
-    "simulate --scheme none --json no/x.json",
-    "trade --points 1000 --csv no/x.csv",
-    "disperse --samples 1e10 --json no/x.json",
-    "animate -o no/x.gif --seconds 600",
-    "report -o no/x.html",
-    "export --format json -o no/x.json",
-    "export dated.yaml --format apm --scheme two-pulse -o no/x.apm",
-    "verify --json no/x.json",
-    "import apm empty.apm -o no/x.yaml",
-]
-
-
-def test_what_cannot_be_read_or_written_is_exit_1(run: Run, tmp_path: Path) -> None:
-    """Before the work: some of these would take hours."""
-    (tmp_path / "folder").mkdir()
-    written(tmp_path, dated_yaml=DATED)
-    written(
-        tmp_path,
-        empty_apm=run("export", "dated.yaml", "--format", "apm", "--scheme", "none").stdout,
-    )
-    commands = [f"{command} --quiet" for command in UNREACHABLE]
-    check_text("cli.refused.unreachable", refusals(run, tmp_path, commands, 1))
+@POSIX
+def test_standard_output_is_a_purpose_too(tmp_path: Path) -> None:
+    for options in ("--csv out", "--csv - --json out"):
+        ended = shell(tmp_path, f'exec "$0" -m nutdamp plan {options} >out')
+        assert ended.returncode == 2
+        assert "goes to this file" in ended.stderr
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links and devices")
@@ -648,23 +628,6 @@ def test_a_path_that_cannot_be_is_exit_1(run: Run, tmp_path: Path) -> None:
         for path, reasons in paths.items():
             ended = run(*command.split(), path, status=1)
             assert ended.stderr.lower().rstrip("\n").endswith(reasons), command
-
-
-@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no such device")
-def test_a_device_is_not_read(run: Run, tmp_path: Path) -> None:
-    commands = [
-        "check /dev/zero",
-        "plan /dev/full",
-        "simulate -q --schedule /dev/zero",
-        "import /dev/null",
-    ]
-    commands.append("fit -q /dev/zero")
-    check_text("cli.refused.devices", refusals(run, tmp_path, commands, 1))
-
-
-def test_an_empty_standard_input_is_a_faulty_file(run: Run, tmp_path: Path) -> None:
-    commands = ["plan -", "simulate --schedule - -q", "import apm -"]
-    check_text("cli.refused.empty", refusals(run, tmp_path, commands, stdin=""))
 
 
 HEADER = "t_s,on_time_s,impulse_1_Nms,impulse_2_Nms,impulse_3_Nms\n"

@@ -76,20 +76,11 @@ def spinner(name: str, theta: float = math.radians(5.0), *, thrusters: bool = Tr
     )
 
 
-def reference(flown: propagation.Flight, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rates and quaternions at ``times``, after a jump where there is one."""
-    legs = [next(leg for leg in reversed(flown.legs) if leg.start <= time) for time in times]
-    rows = [leg.path.motion(np.array([time])) for leg, time in zip(legs, times, strict=True)]
-    return np.array([rates[0] for rates, _ in rows]), np.array(
-        [quaternion[0] for _, quaternion in rows]
-    )
-
-
 def difference(
     spacecraft: Spacecraft, schedule: Schedule, until: float, found: BasiliskFlight
 ) -> float:
     """Largest difference from the flown motion: H and body axes in rad, rates over |ω|."""
-    rates, quaternion = reference(propagation.flown(spacecraft, schedule, until), found.t)
+    rates, quaternion = propagation.flown(spacecraft, schedule, until).motion(found.t)
     inertia = spacecraft.inertia
     still = abs(inertia.wheel) / min(inertia.moments)
     worst = [

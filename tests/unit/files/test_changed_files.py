@@ -1,5 +1,5 @@
 """Spacecraft files with other values: set beside them, carried on by a flight, estimated by a fit;
-their attitudes.
+their attitudes, and one mission in several frames.
 """
 
 import copy
@@ -8,12 +8,12 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.builders import noted, present
@@ -26,18 +26,23 @@ from support.process import Run
 from support.telemetry import silent, told
 
 import nutdamp
+from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile
 from nutdamp.estimation.results import carried, correlations, replaced
 from nutdamp.files.carried import fitted_text, later, notes
 from nutdamp.files.ccsds.read import read_message
 from nutdamp.files.ccsds.write import merge
-from nutdamp.files.editing import edited, parse_setting
-from nutdamp.files.reader import Source, example_text, read_spacecraft
+from nutdamp.files.editing import as_before, parse_setting
+from nutdamp.files.reader import Source, example_text, read_spacecraft, source_of
+from nutdamp.files.telemetry import record_of
 from nutdamp.files.yaml import KeyPath, dotted, read_tree
 from nutdamp.flight.dynamics import supplied
-from nutdamp.physics import attitude
+from nutdamp.physics import attitude, frames
+from nutdamp.spacecraft.model import SpinState
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.views.decisions import plan_json
+from nutdamp.views.simulation import simulation_json
 
 EXAMPLE = example_text()
 
@@ -110,12 +115,6 @@ def test_what_is_set_is_checked_as_the_file_is(value: object) -> None:
     assert placed == {True}
 
 
-def test_setting_every_value_to_itself_changes_nothing() -> None:
-    chosen = [f"{dotted(path)}={json.dumps(value)}" for path, value in LEAVES]
-    assert len(chosen) > 40
-    assert contents(with_settings(EXAMPLE, *chosen)) == contents(with_settings(EXAMPLE))
-
-
 def test_entries_of_lists_sections_that_are_not_there_and_the_later_of_two_settings() -> None:
     for key in (
         "thrusters[1].torque",
@@ -131,13 +130,9 @@ def test_entries_of_lists_sections_that_are_not_there_and_the_later_of_two_setti
     assert (craft.limits.blackout, craft.limits.max_pulses) == (((10.0, 30.0), (40.0, 41.0)), 3)
     assert tuple(craft.omega0) == (0.1, 0.5, 3.0)
     assert with_settings(BASE, "mass=2", "mass=3 kg").mass == 3.0
-
-
-def test_values_that_aliases_share_change_only_where_they_are_set() -> None:
-    text = (
-        BASE + "thrusters:\n  - &t {name: T1, torque: &v [8, 0, 0]}\n  - {name: T2, torque: *v}\n"
-    )
-    craft = with_settings(text, "thrusters.T2.torque[0]=-1")
+    # What aliases share changes only where it is set.
+    shared = "thrusters: [&t {name: T1, torque: &v [8, 0, 0]}, {name: T2, torque: *v}]\n"
+    craft = with_settings(BASE + shared, "thrusters.T2.torque[0]=-1")
     assert [channel.thrusters[0].torque[0] for channel in craft.channels] == [8.0, -1.0]
 
 
@@ -348,16 +343,6 @@ def test_comments_and_units_are_kept() -> None:
     assert isinstance(carried.source, Source)
     text = re.sub(r"nutation: [^,]+ deg, phase: [^}]+ deg", "…", carried.source.text)
     assert text == re.sub(r"nutation: 5 deg, phase: 20 deg", "…", SOUNDER)
-
-
-def test_a_chain_of_files_is_one_flight() -> None:
-    body = nutdamp.read(TEXTS["symmetric"])
-    once = nutdamp.plan(body, "none").carried(60.0)
-    many = body
-    for _ in range(6):
-        many = nutdamp.plan(many, "none").carried(10.0)
-    assert many.omega0 == pytest.approx(once.omega0, abs=1e-10)
-    assert turned(many.initial.quaternion, once.initial.quaternion) < 1e-9
 
 
 def test_what_no_file_can_hold_is_refused() -> None:
@@ -598,14 +583,6 @@ def quaternion(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
     return present(spacecraft.attitude).quaternion
 
 
-def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) -> None:
-    path, _ = exported(tmp_path, SKEW, "apm")
-    (tmp_path / "other.yaml").write_text(SPACECRAFT)
-    for flag, moment in ((), 120.0), (("--inertia",), 110.0):
-        run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *flag, status=0)
-        assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
-
-
 def test_the_nutation_of_a_message_stays_whatever_the_ratio_of_the_file(
     run: Run, tmp_path: Path
 ) -> None:
@@ -705,37 +682,25 @@ def same_angle(first: float, second: float) -> bool:
     return abs((first - second + 180.0) % 360.0 - 180.0) < 1e-7
 
 
+@pytest.mark.parametrize("by", ["phase", "of: momentum, phase", "sun_phase"])
 @given(
     ANGLES, DECLINATIONS, ANGLES, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR])
 )
-def test_the_phase_counts_from_the_ascending_node_to_body_axis_1(
-    ra: float, dec: float, phase: float, spin: float, inertia: str
+def test_the_phase_counts_from_the_ascending_node_or_the_sun_to_body_axis_1(
+    by: str, ra: float, dec: float, phase: float, spin: float, inertia: str
 ) -> None:
-    spacecraft = body(
-        f"spin_axis: [{ra} deg, {dec} deg], phase: {phase} deg", spin=spin, inertia=inertia
-    )
+    """About the spin axis, or the angular momentum."""
+    given = f"spin_axis: [{ra} deg, {dec} deg], {by}: {phase} deg"
+    sun = f"sun: [{ra + 40.0} deg, {0.5 * dec} deg]"
+    spacecraft = body(given, spin=spin, inertia=inertia, more=sun)
     axis = direction(ra, dec)
-    assert np.allclose(spacecraft.axis, axis, rtol=0.0, atol=1e-12)
+    stated = attitude.unit(spacecraft.momentum) if "momentum" in by else spacecraft.axis
+    assert np.allclose(stated, axis, rtol=0.0, atol=1e-12)
+    start = np.cross([0.0, 0.0, 1.0], axis)
+    if by == "sun_phase":
+        start = direction(ra + 40.0, 0.5 * dec)
     first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
-    assert same_angle(angle_about(axis, np.cross([0.0, 0.0, 1.0], axis), first), phase)
-
-
-@given(ANGLES, DECLINATIONS, st.sampled_from([3.0, -3.0]), st.sampled_from([SYMMETRIC, TENSOR]))
-def test_it_may_be_that_of_the_angular_momentum(
-    ra: float, dec: float, spin: float, inertia: str
-) -> None:
-    spacecraft = body(f"spin_axis: [{ra} deg, {dec} deg], of: momentum", spin=spin, inertia=inertia)
-    momentum = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
-    assert np.allclose(momentum, direction(ra, dec), rtol=0.0, atol=1e-12)
-
-
-@given(ANGLES, DECLINATIONS, ANGLES)
-def test_the_phase_may_count_from_the_side_of_the_sun(ra: float, dec: float, phase: float) -> None:
-    sun = (ra + 40.0, 0.5 * dec)
-    given = f"spin_axis: [{ra} deg, {dec} deg], sun_phase: {phase} deg"
-    spacecraft = body(given, more=f"sun: [{sun[0]} deg, {sun[1]} deg]")
-    first = attitude.rotate(quaternion(spacecraft), np.array([1.0, 0.0, 0.0]))
-    assert same_angle(angle_about(direction(ra, dec), direction(*sun), first), phase)
+    assert same_angle(angle_about(axis, start, first), phase)
 
 
 @pytest.mark.parametrize("dec", [90.0, -90.0])
@@ -777,8 +742,157 @@ def test_a_file_carried_on_holds_spin_axis_and_phase(of: str, inertia: str, spin
     assert present(carried.attitude).epoch == "2026-03-01T12:00:10Z"
 
 
-def test_a_list_as_far_left_as_its_key_is_replaced_by_one_that_is_read() -> None:
-    """As ``yaml.safe_dump`` writes lists."""
-    text = "state:\n  omega0:\n  - 1\n  - 2\n  spin: 3\nsun:\n- 4\n- 5\nmass: 6\n"
-    after = yaml.safe_load(edited(text, {("state", "omega0"): "[7, 8]", ("sun",): "[9]"}))
-    assert after == {"state": {"omega0": [7, 8], "spin": 3}, "sun": [9], "mass": 6}
+# --- one mission in several frames: plans alike, directions of the file, exports in EME2000
+
+EPOCH = "2026-03-01T12:00:00Z"
+DAYS = Epoch.parse(EPOCH).days_of_j2000
+OTHER = ("ECLIPJ2000", "ECLIPDATE", "MOD", "GCRF")
+SOLID = 1e-9  # rad and shares: rounding, grown by the search for a plan
+
+
+def mission(frame: str) -> dict[str, Any]:
+    """The keys of a file in a ``frame``, whose directions are the same in space."""
+
+    def turned(vector: list[float]) -> list[float]:
+        return list(map(float, frames.frame_axes(frame, DAYS).T @ np.array(vector)))
+
+    def angles(right_ascension: float, declination: float) -> list[float]:
+        direction = frames.on_sphere(*np.radians([right_ascension, declination]))
+        x, y, z = turned(direction.tolist())
+        return [math.atan2(y, x), math.atan2(z, math.hypot(x, y))]
+
+    right_ascension, declination = angles(45.0, 33.0)
+    return {
+        "name": "Framed",
+        "mass": 250,
+        "inertia": {"A": 120, "C": 150},
+        "state": {"spin": "15 rpm", "nutation": "3 deg"},
+        "attitude": {
+            "spin_axis": angles(40.0, 30.0),
+            "sun_phase": "20 deg",
+            "epoch": EPOCH,
+            "frame": frame,
+        },
+        "sun": "epoch",
+        "keep": [{"name": "star", "direction": angles(80.0, -10.0), "min": "20 deg"}],
+        "goal": {"right_ascension": right_ascension, "declination": declination},
+        "orbit": {"position": turned([7e6, 1e6, -2e6]), "velocity": turned([-1e3, 7e3, 5e2])},
+        "thrusters": [
+            {
+                "name": "T1",
+                "position": [0, 0.5, 0.8],
+                "direction": [1, 0, 0],
+                "force": 2,
+                "isp": 220,
+            },
+            {
+                "name": "T2",
+                "position": [0, -0.5, 0.8],
+                "direction": [1, 0, 0],
+                "force": 2,
+                "isp": 220,
+            },
+        ],
+    }
+
+
+def framed(frame: str) -> nutdamp.Plan:
+    return nutdamp.plan(nutdamp.load(mission(frame)), "half-cone")
+
+
+@pytest.fixture(scope="module")
+def plain() -> nutdamp.Plan:
+    return framed("J2000")
+
+
+@pytest.mark.parametrize("frame", OTHER)
+def test_the_frame_of_a_file_moves_nothing(plain: nutdamp.Plan, frame: str) -> None:
+    plan = framed(frame)
+    assert len(plan.pulses) == len(plain.pulses) > 2
+    for pulse, other in zip(plan.pulses, plain.pulses, strict=True):
+        assert pulse.channel == other.channel
+        times = (other.t, other.on_time)
+        assert (pulse.t, pulse.on_time) == pytest.approx(times, abs=SOLID)
+    assert plan.propellant == pytest.approx(plain.propellant, rel=SOLID)
+    for aspect, same in zip(plan._aspects, plain._aspects, strict=True):
+        assert (aspect.least, aspect.largest) == pytest.approx((same.least, same.largest))
+
+
+@pytest.mark.parametrize("frame", OTHER)
+def test_directions_are_shown_in_the_frame_of_the_file(frame: str) -> None:
+    plan = framed(frame)
+    names = ("right_ascension_deg", "declination_deg")
+    if frame.startswith("ECLIP"):
+        names = ("longitude_deg", "latitude_deg")
+    goal = [math.degrees(angle) for angle in mission(frame)["goal"].values()]
+    end = plan_json(plan)["final"]["axis"]
+    assert [end[name] for name in names] == pytest.approx(goal, abs=1e-6)
+    track = simulation_json(nutdamp.simulate(plan))["axis_track"]
+    assert (track["frame"], [*names]) == (frame, [*track][-2:])
+
+
+WRITTEN = re.compile(r"(?m)^(CREATION_DATE|MESSAGE_ID|COMMENT).*\n")
+NUMBER = re.compile(r"(?<![\w.:-])[-+]?\d+\.\d+(?:[eE][-+]?\d+)?(?![\w:-])")
+
+
+@pytest.mark.parametrize("form", ["apm", "aem", "aem-spin", "opm", "stk"])
+@pytest.mark.parametrize("frame", ["ECLIPJ2000", "ECLIPDATE", "MOD"])
+def test_exports_are_those_of_eme2000(
+    plain: nutdamp.Plan, tmp_path: Path, frame: str, form: str
+) -> None:
+    texts = []
+    for name, plan in (("one", framed(frame)), ("two", plain)):
+        nutdamp.export(plan, form, tmp_path / name)
+        text = WRITTEN.sub("", (tmp_path / name).read_text())
+        texts.append(text.replace("= J2000", "= EME2000"))
+    one, two = ([*map(float, NUMBER.findall(text))] for text in texts)
+    assert len(two) > 10
+    # on-times and starts are written to nanoseconds, and rows follow them
+    assert one == pytest.approx(two, rel=1e-7, abs=1e-7)
+    assert NUMBER.sub("", texts[0]) == NUMBER.sub("", texts[1])
+
+
+def test_what_is_merged_stays_in_the_frame(tmp_path: Path) -> None:
+    plan = framed("ECLIPDATE")
+    nutdamp.export(framed("J2000"), "apm", tmp_path / "a.apm")
+    source = source_of(mission("ECLIPDATE"))
+    merged, _, _ = merge(source, read_message(str(tmp_path / "a.apm")), inertia=False)
+    after = Source(merged, "f.yaml").read()
+    assert present(after.attitude).frame == "ECLIPDATE"
+    assert turn(after) == pytest.approx(turn(plan.spacecraft), abs=SOLID)
+
+
+@pytest.mark.parametrize("frame", OTHER)
+def test_a_file_carried_on_is_in_the_frame_of_its_date(frame: str) -> None:
+    """The axes of date turn by 0.96 arcsec in a week."""
+    plan = nutdamp.plan(nutdamp.load(mission(frame)), "none")
+    time = 7.0 * 86400.0
+    after = plan.carried(time)
+    assert present(after.attitude).frame == frame
+    state = SpinState.of(*(part[0] for part in plan._reaching(time).motion(np.array([time]))))
+    end = replace(present(plan.spacecraft.attitude), quaternion=state.quaternion)
+    expected = end.axes @ attitude.matrix(end.quaternion)
+    seen = present(after.attitude).axes @ attitude.matrix(after.initial.quaternion)
+    assert seen == pytest.approx(expected, abs=1e-10)  # numbers of the file have 12 digits
+
+
+def turn(spacecraft: nutdamp.Spacecraft) -> np.ndarray:
+    return attitude.matrix(spacecraft.initial.quaternion)
+
+
+def test_a_history_of_eme2000_is_telemetry_in_the_frame_of_the_file(tmp_path: Path) -> None:
+    plan = framed("ECLIPDATE")
+    nutdamp.export(plan, "aem", tmp_path / "a.aem", until=20.0)
+    record = record_of(read_message(str(tmp_path / "a.aem")), plan.spacecraft, Schedule())
+    axis = np.array([record.signals[f"axis_{name}"][0] for name in "xyz"])
+    assert attitude.angle_between(axis, plan.spacecraft.axis) < SOLID
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("18h 12m 33s", "30 deg"), ("2 h", "30 deg"), ("60 arcmin", "1800 arcmin"), ("1 rad", None)],
+)
+def test_an_angle_is_written_in_the_unit_of_the_file(text: str, expected: str | None) -> None:
+    (node,) = (child for _, child in read_tree(f"phase: {text}", "f.yaml")[0].children())
+    value = math.radians(30.0)
+    assert as_before(node, value, "angle") == (expected or f"{value:.12g} rad")

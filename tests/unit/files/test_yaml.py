@@ -1,47 +1,27 @@
-"""YAML text -> plain values that know their places -> sections as classes; and files written whole
-or not at all.
+"""YAML text -> plain values that know their places; texts edited; and files written whole or not at
+all.
 """
 
 import json
 import math
 import os
+import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-from jsonschema import Draft202012Validator
 from support.builders import within
 from support.cases import spread
 from support.golden import check_text
 
 from nutdamp.errors import BadRequest, CannotRead, CannotWrite, FaultyFile
 from nutdamp.files.editing import edited
-from nutdamp.files.fields import (
-    NAME,
-    Finding,
-    Key,
-    ValueKind,
-    Values,
-    choice,
-    definitions,
-    either,
-    flag,
-    named,
-    optional,
-    quantity,
-    required,
-    row,
-    rows,
-    section,
-    whole,
-)
-from nutdamp.files.reader import example_text
 from nutdamp.files.tabular import json_text, make_folder, whole_file, write_whole
 from nutdamp.files.yaml import (
     MAX_BYTES,
     MAX_DEPTH,
     MAX_NODES,
+    KeyPath,
     decode,
     dotted,
     read_text,
@@ -167,7 +147,7 @@ def test_places_count_from_one_and_leave_out_byte_order_marks() -> None:
     values = {("a", "b"): (3, 6), ("a", "b", 1, "x"): (3, 14), ("a", "nowhere", 3): (3, 3)}
     assert {path: (*root.place_of(path)[:2],) for path in values} == values
     keys = {("a",): (2, 1), ("a", "b", 1, "x"): (3, 11), ("a", "b", 0): (3, 7), (): (2, 1)}
-    assert {path: (*root.key_place_of(path)[:2],) for path in keys} == keys
+    assert {path: (*root.place_of(path, key=True)[:2],) for path in keys} == keys
     marked, _ = read_tree("\ufeffa: 1\r\nb: 2\r\n", "f.yaml")
     assert (marked.plain(), marked.place_of(("b",))[:2]) == ({"a": 1, "b": 2}, (2, 4))
     assert decode(b"\xef\xbb\xbfa: 1", "f.yaml") == "a: 1"
@@ -222,13 +202,9 @@ def test_what_is_no_plain_yaml_mapping_is_refused_in_one_line_a_fault() -> None:
     check_text(
         "files.yaml-refused", "\n".join(f"{text!r}\n    {refusal(text)}" for text in REFUSED)
     )
-
-
-def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
     root, faults = read_tree("a: 1\nb: {c: 1, c: 2}\na: 3\na: 4\n", "f.yaml")
-    check_text(
-        "files.yaml-duplicates", "\n".join(map(str, sorted(faults, key=lambda fault: fault.line)))
-    )
+    lines = map(str, sorted(faults, key=lambda fault: fault.line))
+    check_text("files.yaml-duplicates", "\n".join(lines))
     assert root.plain() == {"a": 1, "b": {"c": 1}}
 
 
@@ -284,6 +260,9 @@ def test_paths_as_messages_write_them() -> None:
 TEXT = """\
 # top
 name: body   # who
+far:
+- 4
+- 5
 inertia: {A: 120 kg m^2, C: 80}  # moments
 state:
   spin: 30 rpm
@@ -297,38 +276,43 @@ list:
 """
 
 
-def test_values_change_new_keys_go_to_the_end_of_their_mapping_and_comments_stay() -> None:
-    made = edited(
-        TEXT,
+EDITED: dict[str, tuple[dict[KeyPath, str], tuple[tuple[str, str], ...]]] = {
+    "values": (
         {("inertia", "A"): "121 kg m^2", ("state", "nutation"): "6 deg", ("list", 1, "x"): "7"},
-    )
-    assert made == TEXT.replace("120 kg", "121 kg").replace("5 deg", "6 deg").replace(
-        "x: 2", "x: 7"
-    )
-    more = edited(
-        TEXT,
-        {
-            ("inertia", "B"): "5",
-            ("state", "phase"): "1 deg",
-            ("new", "deep"): "2",
-            ("list", 0, "z"): "9",
-        },
-    )
-    expected = TEXT.replace("C: 80}", "C: 80, B: 5}").replace(
-        "# angle\n", "# angle\n  phase: 1 deg\n"
-    )
-    assert more == expected.replace("{x: 1}", "{x: 1, z: 9}") + "new: {deep: 2}\n"
-    example = example_text()
-    assert edited(example, {("inertia", "A"): "121 kg m^2"}) == example.replace(
-        "{A: 120 kg", "{A: 121 kg"
-    )
+        (("120 kg", "121 kg"), ("5 deg", "6 deg"), ("x: 2", "x: 7")),
+    ),
+    "new keys, at the end of their mapping": (
+        {("inertia", "B"): "5", ("state", "phase"): "1 deg", ("list", 0, "z"): "9"},
+        (
+            ("C: 80}", "C: 80, B: 5}"),
+            ("# angle\n", "# angle\n  phase: 1 deg\n"),
+            ("{x: 1}", "{x: 1, z: 9}"),
+        ),
+    ),
+    "a new section": ({("new", "deep"): "2"}, (("    y: 3\n", "    y: 3\nnew: {deep: 2}\n"),)),
+    "a list as far left as its key": ({("far",): "[9]"}, (("- 4\n- 5", "  [9]"),)),
+    "a whole block": (
+        {("state",): "[1, 2, 3]"},
+        (("\n  spin: 30 rpm\n  # between\n  nutation: 5 deg", "\n  [1, 2, 3]"),),
+    ),
+    "an entry of a list": ({("far", 0): "2"}, (("- 4", "- 2"),)),
+}
+"""Values, and what changes in `TEXT`, where comments stay."""
 
 
-def test_a_whole_block_gives_way_to_a_flow_value_and_a_key_to_another_name() -> None:
-    made = edited(TEXT, {("state",): "[1, 2, 3]"}, {"state": "omega0"})
-    begin, end = TEXT.index("state"), TEXT.index("  # angle")
-    assert made == f"{TEXT[:begin]}omega0:\n  [1, 2, 3]{TEXT[end:]}"
-    assert read_tree(made, "made")[0].get("omega0") is not None
+def test_values_of_a_text_change_and_all_else_stays() -> None:
+    for name, (values, changes) in EDITED.items():
+        expected = TEXT
+        for change in changes:
+            expected = expected.replace(*change)
+        assert edited(TEXT, values) == expected, name
+    for text, path, problem in (
+        ("a: &x {k: 1}\nb: *x\n", ("b", "k"), "b is an alias: write its value out"),
+        ("a: &x 1\nb: *x\n", ("a",), "a has the alias *x: write that out"),
+    ):
+        with pytest.raises(BadRequest, match=re.escape(problem)):
+            edited(text, {path: "2"})
+    assert edited("a: &x 1\nb: 3\n", {("a",): "2"}) == "a: 2\nb: 3\n"
 
 
 @pytest.mark.parametrize("end", ["", "\n", "\n\n# the end\n", "\n# the end"])
@@ -340,133 +324,7 @@ def test_a_text_may_end_as_it_likes(text: str, end: str) -> None:
     assert made.endswith(end)
 
 
-def test_an_alias_and_what_has_one_are_refused_and_an_anchor_without_one_is_no_hindrance() -> None:
-    with pytest.raises(BadRequest, match="b is an alias: write its value out"):
-        edited("a: &x {k: 1}\nb: *x\n", {("b", "k"): "2"})
-    with pytest.raises(BadRequest, match=r"a has the alias \*x: write that out"):
-        edited("a: &x 1\nb: *x\n", {("a",): "2"})
-    assert edited("a: &x 1\nb: 3\n", {("a",): "2"}) == "a: 2\nb: 3\n"
-
-
-# --- sections as classes: every type that a key may have, read and in the schema
-
-TIME = quantity("time", minimum=0)
-
-
-def key(kind: ValueKind, default: Any = None) -> Key:
-    return optional(kind, "What it is.", default=default)
-
-
-INNER = section("Inner", "Below.", {"t": required(TIME, "Time of it, s.", "1 s")})
-OUTER = section(
-    "Outer",
-    "Every kind.",
-    {
-        "text": key(NAME),
-        "whole": key(whole(1, 9)),
-        "flag": key(flag(), False),
-        "choice": key(choice("one", "two")),
-        "times": key(rows(TIME, 2, 3)),
-        "pair": key(row(TIME, whole(0, 9))),
-        "named": key(named(INNER, 1)),
-        "either": key(either(rows(TIME, 1), INNER)),
-        "inner": key(INNER),
-        "inners": key(rows(INNER), []),
-    },
-)
-
-
-def read(contents: object) -> tuple[Any, list[Finding]]:
-    """The section in a file, and what is wrong."""
-    values = Values(read_tree(json.dumps(contents), "f.yaml")[0])
-    return values.read(OUTER, values.root), values.findings
-
-
-GOOD: dict[str, tuple[Any, object]] = {
-    "text": ("a", "a"),
-    "whole": (9, 9),
-    "flag": (True, True),
-    "choice": ("two", "two"),
-    "times": (["20 ms", 1], [0.02, 1.0]),
-    "pair": (["20 ms", 3], [0.02, 3]),
-    "either": (["1 min"], [60.0]),
-}
-SECTIONS = {
-    "named": {"a": {"t": 1}},
-    "either": {"t": 2},
-    "inner": {"t": 3},
-    "inners": [{"t": 4}, {"t": "5 s"}],
-}
-BAD: dict[str, tuple[Any, ...]] = {
-    "text": ("", 3, [3]),
-    "whole": (10, 0, True, 2.0),
-    "flag": ("on",),
-    "choice": ("tow",),
-    "times": ("1 s", [1], [1, 2, 3, 4], [1, -2], [1, 2, 3, "x"]),
-    "pair": ({"a": 1}, [1], [1, "x"]),
-    "named": ({}, {"a": {}}),
-    "either": ({"t": "x"}, "x"),
-    "inner": (3,),
-    "inners": ([{"t": 1}, {"t": [1]}],),
-}
-
-
-def test_what_is_right_is_read_also_within_lists_and_mappings() -> None:
-    for name, (value, expected) in GOOD.items():
-        contents, findings = read({name: value})
-        assert (getattr(contents, name), findings) == (expected, [])
-    contents, findings = read(SECTIONS)
-    assert contents.flag is False  # by default
-    parts = [contents.named["a"], contents.either, contents.inner, *contents.inners]
-    assert [part.t for part in parts] == [1, 2, 3, 4, 5]
-    assert findings == []
-
-
-def test_what_is_wrong_is_said_where_it_is_and_all_of_it_at_once() -> None:
-    """Each is one fault: also a list too long with a wrong entry."""
-    lines = []
-    for name, value in ((name, value) for name, values in BAD.items() for value in values):
-        ((where, problem, _),) = read({name: value})[1]
-        lines.append(f"{name}: {value!r} -> {where}: {problem}")
-    check_text("files.sections", "\n".join(lines))
-    several = read({"whole": 0, "times": [-1, "x"], "inner": {}})[1]
-    assert [finding.path for finding in several] == [
-        ("whole",),
-        ("times", 0),
-        ("times", 1),
-        ("inner", "t"),
-    ]
-
-
-def test_the_schema_allows_what_is_read_and_nothing_else() -> None:
-    schema = {**OUTER.definition, "$defs": definitions(OUTER)}
-    Draft202012Validator.check_schema(schema)
-    judge = Draft202012Validator(schema)
-    assert all(
-        judge.is_valid(right)
-        for right in ({}, SECTIONS, *({name: given} for name, (given, _) in GOOD.items()))
-    )
-    allowed = [
-        (name, value)
-        for name, values in BAD.items()
-        for value in values
-        if judge.is_valid({name: value})
-    ]
-    assert allowed == [("whole", 2.0)]  # JSON knows no other 2
-
-
 # --- files are written whole or not at all
-
-
-def test_what_another_run_is_writing_is_left_alone(tmp_path: Path) -> None:
-    with whole_file(str(tmp_path / "slow.csv")) as stream:
-        stream.write(b"slow")
-        write_whole(str(tmp_path / "quick.csv"), "quick")
-        assert len([path for path in tmp_path.iterdir() if path.name.startswith(".")]) == 1
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
-        "slow.csv": "slow",
-        "quick.csv": "quick",
-    }
 
 
 def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> None:
@@ -475,11 +333,13 @@ def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> Non
     def fill_the_disk() -> None:
         with whole_file(str(tmp_path / "x.csv")) as stream:
             stream.write(b"half")
+            write_whole(str(tmp_path / "quick.csv"), "quick")  # by another run
             raise OSError(28, "no room")
 
     with pytest.raises(CannotWrite, match="no room"):
         fill_the_disk()
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"x.csv": "before"}
+    there = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert there == {"x.csv": "before", "quick.csv": "quick"}
     with pytest.raises(CannotWrite):  # a zero byte is no path
         write_whole("a\0b", "1")
     with pytest.raises(CannotWrite):

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from nutdamp.files import facts, reader
+from nutdamp.files import reader
 from nutdamp.flight.verification import Verification, verify
 from nutdamp.physics import attitude, body, response
 from nutdamp.physics.thruster import Trapezoid
@@ -40,9 +40,10 @@ BURN = f"{JETS}disturbances: [{{torque: [2 N m, 1 N m, 0], from: 1 s, until: 20 
 Plant = Callable[[pytest.MonkeyPatch], None]
 
 
-def thruster(changed: Callable[[Thruster], Thruster]) -> Plant:
-    read = reader._thruster
-    return lambda patch: patch.setattr(reader, "_thruster", lambda *parts: changed(read(*parts)))
+def after(owner: Any, name: str, changed: Callable[[Any], Any]) -> Plant:
+    """A function of a module or class, whose result is ``changed``."""
+    usual = getattr(owner, name)
+    return lambda patch: patch.setattr(owner, name, lambda *parts: changed(usual(*parts)))
 
 
 def off_center(patch: pytest.MonkeyPatch) -> None:
@@ -78,61 +79,42 @@ def inertia(first: float, wheel: float) -> Plant:
     return lambda patch: patch.setattr(reader, "Inertia", faulty)
 
 
-def against(patch: pytest.MonkeyPatch) -> None:
-    read = reader._disturbance
-    patch.setattr(
-        reader, "_disturbance", lambda *parts: replace(read(*parts), rate=-read(*parts).rate)
-    )
-
-
-def later_end(patch: pytest.MonkeyPatch) -> None:
-    read = reader._disturbance
-    patch.setattr(
-        reader, "_disturbance", lambda *parts: replace(read(*parts), end=read(*parts).end + 1e-3)
-    )
-
-
-def narrower(patch: pytest.MonkeyPatch) -> None:
-    usual = body.momentary
-
-    def cones(*parts: Any) -> Any:
-        return usual(*parts)._replace(nutation=0.9 * usual(*parts).nutation)
-
-    patch.setattr(body, "momentary", cones)
-
-
-def to_body(patch: pytest.MonkeyPatch) -> None:
-    read = reader._attitude
-
-    def turned(*parts: Any) -> Any:
-        usual = read(*parts)
-        return replace(usual, quaternion=attitude.conjugate(usual.quaternion))
-
-    patch.setattr(reader, "_attitude", turned)
-
-
-def stronger(patch: pytest.MonkeyPatch) -> None:
-    usual = facts.force_vector
-    patch.setattr(reader, "force_vector", lambda *parts: 1.02 * usual(*parts))
-
-
 FAULTS: dict[str, tuple[str, Plant]] = {
     "center of mass added": (JETS, off_center),
-    "cross product swapped": (JETS, thruster(lambda jet: replace(jet, torque=-jet.torque))),
+    "cross product swapped": (
+        JETS,
+        after(reader, "_thruster", lambda jet: replace(jet, torque=-jet.torque)),
+    ),
     "sign of a delay": (VALVE, valve(lambda one: replace(one, open_delay=-one.open_delay))),
     "torque x 1.02": (JETS, scaled(Channel, "torque", 1.02)),
     "sign of the wheel in H": (WHEEL, inertia(1.0, -1.0)),
     "time constant x 1.1": (DAMPER, scaled(Spacecraft, "growth", 1.0 / 1.1)),
     "mass flow x 2": (JETS, scaled(Thruster, "mass_flow", 2.0)),
-    "sign of fixed_in": (LEAK, against),
-    "until 1 ms later": (BURN, later_end),
-    "nutation x 0.9": (JETS, narrower),
-    "width factor 1": (JETS, lambda patch: patch.setattr(response, "width_factor", lambda *_: 1.0)),
-    "force x 1.02": (JETS, stronger),
-    "isp x 1.02": (JETS, thruster(lambda jet: replace(jet, isp=1.02 * (jet.isp or 0.0)))),
+    "sign of fixed_in": (
+        LEAK,
+        after(reader, "_disturbance", lambda one: replace(one, rate=-one.rate)),
+    ),
+    "until 1 ms later": (
+        BURN,
+        after(reader, "_disturbance", lambda one: replace(one, end=one.end + 1e-3)),
+    ),
+    "nutation x 0.9": (
+        JETS,
+        after(body, "momentary", lambda it: it._replace(nutation=0.9 * it.nutation)),
+    ),
+    "width factor 1": (JETS, after(response, "width_factor", lambda _: 1.0)),
+    "force x 1.02": (JETS, after(reader, "force_vector", lambda force: 1.02 * force)),
+    "isp x 1.02": (JETS, after(reader, "_thruster", lambda jet: replace(jet, isp=1.02 * jet.isp))),
     "thrust 1 ms late": (VALVE, valve(lambda one: one, late=0.001)),
     "A x 1.01": (JETS, inertia(1.01, 1.0)),
-    "quaternion of the frame to the body": (JETS, to_body),
+    "quaternion of the frame to the body": (
+        JETS,
+        after(
+            reader,
+            "_attitude",
+            lambda it: replace(it, quaternion=attitude.conjugate(it.quaternion)),
+        ),
+    ),
 }
 
 

@@ -277,35 +277,6 @@ def test_a_damper_of_a_body_with_a_wheel_keeps_h_and_takes_the_energy_of_its_ang
     assert 0.5 * rates**2 @ [800.0, 800.0, 150.0] == pytest.approx(energy, rel=1e-11)
 
 
-@spread(
-    ("moments", "spin"),
-    [
-        ((123.0, 117.0, 80.0), 3.0),
-        ((80.0, 80.0, 120.0), -3.0),
-        ((120.0, 120.0, 80.0), 3.0),
-        ((80.0, 80.0, 120.0), 3.0),
-    ],
-    quick=0,
-    deep=2,
-)
-def test_dop853_by_the_torque_law_confirms_flights_with_dissipation(
-    moments: tuple[float, float, float], spin: float
-) -> None:
-    """At 40 degrees of nutation, through real widths:
-    exact arcs and series against the torque law.
-    """
-    body = replace(
-        spinner(moments=moments, spin=spin, degrees=40.0),
-        channels=EXAMPLE.channels,
-        dissipation=60.0,
-    )
-    pulses = [
-        channel_pulse(EXAMPLE.channels[index], t, 0.8)
-        for index, t in ((0, 2.0), (2, 21.0), (1, 50.0))
-    ]
-    assert confirmed(verify(documented(body), Schedule(tuple(pulses))), 1e-10)
-
-
 def test_the_command_prints_both_tables(run: Run) -> None:
     verified = run("verify", "--scheme", "two-pulse", "-v")
     assert verified.returncode == 0

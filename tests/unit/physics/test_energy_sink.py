@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import reference
-from support.cases import deep, spread
+from support.cases import spread
 from support.spinning import EPS, Triple, arc, series
 
 from nutdamp.physics import attitude, energy_sink
-from nutdamp.physics.series import Forcing
+from nutdamp.physics.motion import Forcing
 
 QUATERNION = reference.vector(0.5, -0.1, 0.7, 0.5)  # of length 1
 START = attitude.matrix(QUATERNION)
@@ -81,7 +81,7 @@ def test_the_arc_agrees_with_dop853(one: Body) -> None:
     """On H in space and the attitude. Energy falls, the size of H stays."""
     times = np.linspace(0.0, 100.0, 6)
     rates, turned = one.arc(*times)
-    motions = reference.sinking(one.moments, one.start, np.zeros(3), times[1:], one.growth)
+    motions = reference.coast(one.moments, one.start, np.zeros(3), times[1:], growth=one.growth)
     for rate, turn, motion in zip(rates[1:], turned[1:], motions, strict=True):
         assert rate == pytest.approx(motion.rates, abs=1e-9)
         assert reference.turned(motion.rotation, turn) < 1e-9
@@ -158,17 +158,6 @@ def test_no_time_is_too_long(growth: float, degrees: float, time: float) -> None
     assert math.hypot(course.cosine, sine * course.sine) == pytest.approx(1.0, abs=20 * EPS)
 
 
-def test_a_complex_step_gives_the_derivative_by_time() -> None:
-    theta = math.radians(30.0)
-    course = energy_sink.courses(
-        0.02, math.cos(theta), math.sin(theta) ** 2, np.array([20.0 + 1e-30j])
-    )
-    tilt = math.atan2(math.sin(theta) * course.transverse[0].real, course.along[0].real)
-    assert course.travel[0].imag / 1e-30 == pytest.approx(math.cos(tilt), rel=1e-13)
-    rise = math.sin(theta) * course.transverse[0].imag / 1e-30
-    assert rise == pytest.approx(0.02 * math.sin(tilt) * math.cos(tilt) ** 2, rel=1e-12)
-
-
 # --- torques, and three different moments: the series of `rigid`
 # -----------------------------------------------------
 
@@ -197,8 +186,12 @@ def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Tr
         Forcing(growth=growth),
     )
     rates, turned = pieces[-1].end()
-    (expected,) = reference.sinking(
-        moments, reference.Motion(rates0, START), reference.vector(*torque), np.array([6.0]), growth
+    (expected,) = reference.coast(
+        moments,
+        reference.Motion(rates0, START),
+        reference.vector(*torque),
+        np.array([6.0]),
+        growth=growth,
     )
     assert rates == pytest.approx(expected.rates, abs=2e-12)
     assert reference.turned(expected.rotation, attitude.matrix(turned)) < 2e-12
@@ -206,30 +199,6 @@ def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Tr
         (closed,), (rotation,) = Body(moments[0], moments[2], growth, 0.5 - 0.3j, spin).arc(6.0)
         assert rates == pytest.approx(closed, abs=2e-13)
         assert reference.turned(rotation, attitude.matrix(turned)) < 2e-12
-
-
-@pytest.mark.parametrize(
-    ("moments", "growth"), [((120.0, 100.0, 80.0), 1 / 15), deep((80.0, 90.0, 130.0), -1 / 15)]
-)
-def test_three_moments_lose_energy_and_end_about_the_largest(
-    moments: Triple, growth: float
-) -> None:
-    """Also beyond the separatrix: about axis 1 (prolate) or axis 3 (oblate) in the end; H stays in
-    space.
-    """
-    rates = reference.vector(0.4, 0.3, 2.0)
-    turned = QUATERNION
-    energies = []
-    h = attitude.rotate(turned, rates * moments)
-    for start in np.arange(0.0, 200.0, 10.0).tolist():
-        pieces = series(
-            moments, np.zeros(3), rates, turned, start, start + 10.0, Forcing(growth=growth)
-        )
-        rates, turned = pieces[-1].end()
-        energies.append(reference.energy(moments, rates))
-        assert attitude.rotate(turned, rates * moments) == pytest.approx(h, abs=1e-10)
-    assert np.all(np.diff(energies) < 1e-13 * energies[0])
-    assert energies[-1] == pytest.approx(0.5 * float(h @ h) / max(moments), rel=1e-3)
 
 
 @pytest.mark.parametrize("aside", [0.0, 1e-12, 1e-6])

@@ -13,6 +13,7 @@ from support import reference
 from support.spinning import EPS, Triple, about, spinners
 
 from nutdamp.physics import body as rigid_body
+from nutdamp.physics import inertia as principal_moments
 from nutdamp.physics import triaxial
 
 
@@ -41,15 +42,15 @@ def test_rotated_tensor_is_diagonal_in_its_principal_axes(
     R = about(axis, angle)
     tensor = scale * R @ np.diag(moments) @ R.T
     tensor = 0.5 * (tensor + tensor.T)
-    principal, axes = rigid_body.principal_axes(tensor)
+    principal, axes = principal_moments.principal_axes(tensor)
     assert axes.T @ axes == pytest.approx(np.eye(3), abs=8 * EPS)
     assert np.linalg.det(axes) == pytest.approx(1.0, abs=8 * EPS)  # right handed
     # Moments nearer than DEGENERATE count as equal: that much may stay off the diagonal.
     assert axes.T @ tensor @ axes == pytest.approx(
-        np.diag(principal), abs=scale * (rigid_body.DEGENERATE + 20 * EPS)
+        np.diag(principal), abs=scale * (principal_moments.DEGENERATE + 20 * EPS)
     )
     assert sorted(principal) == pytest.approx(
-        sorted(scale * one for one in moments), rel=rigid_body.DEGENERATE
+        sorted(scale * one for one in moments), rel=principal_moments.DEGENERATE
     )
 
 
@@ -61,7 +62,7 @@ def test_axes_are_named_by_the_axes_of_the_file_they_are_near_to(
     first.
     """
     R = about(axis, angle)
-    principal, axes = rigid_body.principal_axes(R @ np.diag(moments) @ R.T)
+    principal, axes = principal_moments.principal_axes(R @ np.diag(moments) @ R.T)
     assert principal == pytest.approx(moments, rel=50 * EPS)
     assert axes == pytest.approx(
         R, abs=50 * EPS / 0.1
@@ -74,10 +75,10 @@ def test_axes_that_the_tensor_leaves_open() -> None:
     """
     for order in itertools.permutations((5.0, 4.0, 3.0)):
         R = about((1.0, 2.0, 0.5), 0.02)
-        assert rigid_body.principal_axes(R @ np.diag(order) @ R.T)[0] == pytest.approx(
+        assert principal_moments.principal_axes(R @ np.diag(order) @ R.T)[0] == pytest.approx(
             order, rel=50 * EPS
         )
-    principal, axes = rigid_body.principal_axes(np.diag([3.0, 2.0, 4.0]))
+    principal, axes = principal_moments.principal_axes(np.diag([3.0, 2.0, 4.0]))
     assert principal == (3.0, 2.0, 4.0)
     assert np.array_equal(axes, np.eye(3))
     for moments, R in (
@@ -86,13 +87,13 @@ def test_axes_that_the_tensor_leaves_open() -> None:
         # Only axis 2 is given: axis 3 is free in its plane.
         ((5.0, 3.0, 5.0), about((1.0, 0.0, 0.0), math.radians(10))),
     ):
-        principal, axes = rigid_body.principal_axes(R @ np.diag(moments) @ R.T)
+        principal, axes = principal_moments.principal_axes(R @ np.diag(moments) @ R.T)
         assert principal == pytest.approx(moments, rel=10 * EPS)
         assert axes == pytest.approx(R, abs=50 * EPS)
     smeared = 7.0 * np.eye(3) + 1e-15 * np.array(
         [[0, 1, 2], [1, 0, 3], [2, 3, 0]]
     )  # a sphere, but for rounding
-    principal, axes = rigid_body.principal_axes(smeared)
+    principal, axes = principal_moments.principal_axes(smeared)
     assert principal == pytest.approx((7.0, 7.0, 7.0), rel=4 * EPS)
     assert axes == pytest.approx(np.eye(3), abs=4 * EPS)
 
@@ -115,9 +116,9 @@ def test_moments_that_differ_by_rounding_are_one() -> None:
             )
         },
     }.items():
-        settled = rigid_body.settled(moments)
+        settled = principal_moments.settled(moments)
         assert settled == pytest.approx(expected, rel=2 * EPS)
-        assert rigid_body.settled(settled) == settled
+        assert principal_moments.settled(settled) == settled
         assert [settled[0] == one for one in settled] == [expected[0] == one for one in expected]
 
 
@@ -125,12 +126,12 @@ def test_moments_that_differ_by_rounding_are_one() -> None:
 def test_what_is_a_sphere_is_one_for_every_question(size: float, one: float, two: float) -> None:
     moments = (
         size,
-        size * (1 + one * rigid_body.DEGENERATE),
-        size * (1 + two * rigid_body.DEGENERATE),
+        size * (1 + one * principal_moments.DEGENERATE),
+        size * (1 + two * principal_moments.DEGENERATE),
     )
-    first, second, third = settled = rigid_body.settled(moments)
-    kind = rigid_body.axis_class(moments)
-    assert kind == rigid_body.axis_class(settled)
+    first, second, third = settled = principal_moments.settled(moments)
+    kind = principal_moments.axis_class(moments)
+    assert kind == principal_moments.axis_class(settled)
     assert (
         (kind == "sphere")
         == (first == second == third)
@@ -154,8 +155,8 @@ def test_axis_class() -> None:
     }
     for kind, bodies in kinds.items():
         for first, second, third in bodies:
-            assert rigid_body.axis_class((first, second, third)) == kind
-            assert rigid_body.axis_class((second, first, third)) == kind
+            assert principal_moments.axis_class((first, second, third)) == kind
+            assert principal_moments.axis_class((second, first, third)) == kind
 
 
 def test_growth_is_what_integration_shows() -> None:
@@ -163,7 +164,7 @@ def test_growth_is_what_integration_shows() -> None:
     none.
     """
     for spin in (1.5, -1.5):
-        unstable = rigid_body.growth((2.0, 4.0, 3.0), spin)
+        unstable = principal_moments.growth((2.0, 4.0, 3.0), spin)
         rate = math.sqrt(unstable.squared_exponent)
         assert rate == pytest.approx(0.5303, abs=5e-5)
         assert not unstable.stable
@@ -175,42 +176,57 @@ def test_growth_is_what_integration_shows() -> None:
         (later,) = reference.coast((2.0, 4.0, 3.0), start, np.zeros(3), np.array([10.0]))
         assert math.log(later.rates[0] / 1e-9) / 10.0 == pytest.approx(rate, rel=1e-6)
     for moments in ((1.0, 2.0, 2.0), (2.0, 1.0, 2.0)):
-        assert rigid_body.growth(moments, 1.5) == (0.0, False, math.inf)
+        assert principal_moments.growth(moments, 1.5) == (0.0, False, math.inf)
     start = reference.Motion(reference.vector(1e-7, 0.0, 1.5), np.eye(3))
     (later,) = reference.coast((1.0, 2.0, 2.0), start, np.zeros(3), np.array([40.0]))
     assert later.rates[1] == pytest.approx((2.0 - 1.0) / 2.0 * 1.5 * 1e-7 * 40.0, rel=1e-6)
     assert (
-        rigid_body.growth((2.0, 2.0, 2.0), 1.5)
-        == rigid_body.growth((2.0, 4.0, 3.0), 0.0)
+        principal_moments.growth((2.0, 2.0, 2.0), 1.5)
+        == principal_moments.growth((2.0, 4.0, 3.0), 0.0)
         == (0.0, True, math.inf)
     )
 
 
-@given(st.tuples(*[st.floats(0.1, 1.0)] * 3), st.floats(0.1, 5.0) | st.floats(-5.0, -0.1))
-def test_stable_is_extreme(sides: Triple, spin: float) -> None:
+@given(
+    st.tuples(*[st.floats(0.1, 1.0)] * 3),
+    st.floats(0.1, 5.0) | st.floats(-5.0, -0.1),
+    st.just(0.0) | st.floats(-5.0, 5.0),
+)
+def test_stable_is_extreme_and_a_wheel_may_change_that(
+    sides: Triple, spin: float, wheel: float
+) -> None:
     x, y, z = sides
     first, second, third = moments = (y + z, z + x, x + y)
-    kind = rigid_body.axis_class(moments)
-    result = rigid_body.growth(moments, spin)
-    assert result.stable == (kind in {"minimum", "maximum", "sphere"})
-    assert (result.squared_exponent < 0) == (kind in {"minimum", "maximum"})
-    assert math.isfinite(result.growth_time) == (kind == "intermediate")
-    assert rigid_body.growth(moments, -spin) == result
+    result = principal_moments.growth(moments, spin, wheel)
+    assert principal_moments.growth(moments, -spin, -wheel) == result
     # The eigenvalues of the linear equation are the exponents.
-    matrix = spin * np.array([[0, (second - third) / first], [(third - first) / second, 0]])
-    assert result.squared_exponent == pytest.approx(-float(np.linalg.det(matrix)), abs=1e-7)
+    by_second, by_first = (second - third) * spin - wheel, (third - first) * spin + wheel
+    assert result.squared_exponent == pytest.approx(
+        by_second / first * (by_first / second), abs=1e-7
+    )
+    assert math.isfinite(result.growth_time) == (result.squared_exponent > 0.0)
+    if wheel == 0.0:
+        kind = principal_moments.axis_class(moments)
+        assert result.stable == (kind in {"minimum", "maximum", "sphere"})
+        assert (result.squared_exponent < 0) == (kind in {"minimum", "maximum"})
+    if result.squared_exponent < 0.0:
+        rate = triaxial.body_nutation_rate(moments, spin, wheel)
+        assert rate * rate == pytest.approx(-result.squared_exponent, rel=1e-12)
+    elif result.squared_exponent > 0.0:
+        with pytest.raises(ValueError, match="no nutation rate"):
+            triaxial.body_nutation_rate(moments, spin, wheel)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-10, 0.01, 0.3])
 def test_principal_tilt(tilt: float) -> None:
     turn = about((1.0, 0.0, 0.0), tilt)
     assert (
-        rigid_body.principal_tilt(turn)
-        == rigid_body.principal_tilt(-turn)
+        principal_moments.principal_tilt(turn)
+        == principal_moments.principal_tilt(-turn)
         == pytest.approx(tilt, rel=1e-14)
     )
-    _, axes = rigid_body.principal_axes(turn @ np.diag([120.0, 100.0, 80.0]) @ turn.T)
-    assert rigid_body.principal_tilt(axes) == pytest.approx(tilt, abs=1e-14)
+    _, axes = principal_moments.principal_axes(turn @ np.diag([120.0, 100.0, 80.0]) @ turn.T)
+    assert principal_moments.principal_tilt(axes) == pytest.approx(tilt, abs=1e-14)
 
 
 @spinners
@@ -218,7 +234,7 @@ def test_nutation_in_three_frames(A: float, C: float, spin: float) -> None:
     omega0 = 0.2 + 0.1j
     step = 0.1
     start = reference.Motion(reference.vector(0.2, 0.1, spin), np.eye(3))
-    turning = rigid_body.nutation_rates(A, C, abs(omega0), spin)
+    turning = principal_moments.nutation_rates(A, C, abs(omega0), spin)
     (motion,) = reference.coast((A, A, C), start, np.zeros(3), np.array([step]))
     # In the body ω turns at K(7); the body has turned by ω3 t in the despun frame, where it turns
     # at K(10).

@@ -13,17 +13,25 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from support import reference
+from support.builders import present
 from support.cases import deep, spread
 from support.golden import refused
-from support.spinning import EPS, Triple, about, arc, driven, series, turning
+from support.spinning import EPS, Triple, driven, series, turning
 
 from nutdamp.common.numerics import cos_sin
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.propagated import Pulses
 from nutdamp.montecarlo.propagated import fly_pulses as fly
 from nutdamp.physics import attitude
-from nutdamp.physics.motion import BLOCK, MotionStretch, advance, polynomials
-from nutdamp.physics.series import NOTHING, Bodies, Falling, Forcing
+from nutdamp.physics.motion import (
+    BLOCK,
+    NOTHING,
+    Bodies,
+    Falling,
+    Forcing,
+    MotionStretch,
+    polynomials,
+)
 from nutdamp.physics.sky import AxisWatch
 
 FLOWN = 1e-11
@@ -89,32 +97,6 @@ def test_motion_under_fixed_and_turning_torques(
         )
 
 
-def test_a_spin_up_about_a_principal_axis_and_rest() -> None:
-    """ω = Mt/I, angle Mt²/(2I): seven and a half turns."""
-    body = (2.0, 3.0, 4.0)
-    still = np.zeros(3)
-    angle = 9.7**2 / 2
-    rates, quaternion = last(body, reference.vector(0, 0, 4), still, 0.0, 9.7)
-    assert rates == pytest.approx([0, 0, 9.7], abs=100 * EPS)
-    assert attitude.matrix(quaternion) == pytest.approx(about((0, 0, 1), angle), abs=1000 * EPS)
-    assert np.array_equal(np.concatenate(last(body, still, still, 0.0, 1e6)), [*still, *START])
-
-
-@pytest.mark.parametrize(("mass", "time"), [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-9), (1.0, 1e6)])
-def test_units_do_not_matter(mass: float, time: float) -> None:
-    """Rates × s, torques × s², times / s: the same path through space."""
-    torque, rates, (first, second, third) = (
-        reference.vector(5, 2, 1),
-        reference.vector(1, 2, 3),
-        BODY,
-    )
-    plain = last(BODY, torque, rates, 0.0, 5.0)
-    moments = first * mass, second * mass, third * mass
-    scaled = last(moments, torque * mass * time**2, rates * time, 0.0, 5.0 / time)
-    assert scaled[0] / time == pytest.approx(plain[0], rel=200 * EPS)
-    assert scaled[1] == pytest.approx(plain[1], abs=200 * EPS)
-
-
 def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
     """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other
     time.
@@ -139,35 +121,8 @@ def test_what_cannot_be_integrated_is_refused() -> None:
         series(body, reference.vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
     with refused(Infeasible, "physics.too-long"):
         last(body, reference.vector(1, 0, 0), rates, 0.0, 1e6)
-
-
-@pytest.mark.parametrize(
-    ("forcing", "alike"),
-    [(Forcing(), (0, 1)), (Forcing(TURNING), (0, 1)), (Forcing(), (0, 2))],
-    ids=["fixed", "turning", "symmetric about axis 2"],
-)
-def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, int]) -> None:
-    """Bodies, motions, torques, begins and durations of their own."""
-    rng = np.random.default_rng(12)
-    count = 7
-    A = 100.0 * (1.0 + 0.2 * rng.normal(size=count))
-    moments = np.tile(80.0 * (1.0 + 0.2 * rng.normal(size=count)), (3, 1))
-    moments[[*alike]] = A
-    rates = rng.normal(size=(3, count))
-    torque = 20.0 * rng.normal(size=(3, count))
-    now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
-    omega = rates.copy()
-    quaternion = np.repeat(START[:, None], count, axis=1)
-    bodies = Bodies(moments, np.zeros(3), forcing)
-    advance(MotionStretch(bodies, now, omega, quaternion, torque), duration)
-    for case, (first, second, third) in enumerate(moments.T.tolist()):
-        begin, end = float(now[case]), float(now[case] + duration[case])
-        body = first, second, third
-        pieces = series(body, torque[:, case], rates[:, case], START, begin, end, forcing)
-        alone = np.concatenate(pieces[-1].end())
-        assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(
-            alone, abs=1e-12
-        )
+    with refused(Infeasible, "physics.cases-too-long"):
+        cases(2, TENSOR, starts=(2e5,), on_times=(1.0,), constant=np.array([0.0, 0.0, 1e-9])).fly()
 
 
 # --- many cases at once against the independent integrator, case by case; their spin axes over long
@@ -178,6 +133,15 @@ STILL = np.zeros(3)
 SYMMETRIC = (120.0, 120.0, 80.0)
 OBLATE = (80.0, 80.0, 130.0)
 TENSOR = (120.0, 100.0, 80.0)
+
+
+def some_of(pulses: Pulses, which: Any) -> Pulses:
+    """Pulses of some of the cases."""
+    fields = pulses.starts, pulses.impulses, pulses.leans, pulses.sheds
+    starts, impulses, leans, sheds = (None if part is None else part[..., which] for part in fields)
+    widths = pulses.on_times
+    widths = widths if widths.shape[-1] == 1 or widths.ndim == 1 else widths[:, which]
+    return Pulses(present(starts), widths, present(impulses), leans, sheds)
 
 
 class Case(NamedTuple):
@@ -196,7 +160,7 @@ class Case(NamedTuple):
             self.bodies.some(which),
             self.rates[:, which],
             self.quaternion[:, which],
-            self.pulses.some(which),
+            some_of(self.pulses, which),
         )
 
     def start(self, number: int) -> reference.Motion:
@@ -296,6 +260,12 @@ MIXED = {"starts": (0.0, 0.9, 1.0, 1.8), "on_times": (0.0, 0.4, 0.0, 0.0)}
         ({"count": 5, "starts": (0.5, 0.8, 2.0), "on_times": (0.6, 0.2, 0.4)}, (0, 4), 2e-12),
         ({"count": 5, **MIXED, "jitter": 0.0}, (0, 4), 2e-12),
         ({"count": 8, **MIXED, "jitter": 0.2}, (0, 4, 7), 2e-12),
+        # In another order in some of them.
+        (
+            {"count": 30, "starts": (0.5, 1.05, 1.1), "on_times": (0.5, 0.2, 0.4), "jitter": 0.12},
+            range(0, 30, 6),
+            2e-12,
+        ),
     ],
 )
 def test_pulses_are_flown_as_by_the_reference(
@@ -304,53 +274,29 @@ def test_pulses_are_flown_as_by_the_reference(
     assert_flown_alike(cases(**options), numbers, tolerance)
 
 
-@pytest.mark.parametrize("start", [0.0, 0.4])
-def test_a_pulse_may_be_an_impulse_in_some_cases_only(start: float) -> None:
-    """Widths of each case, of which one is 0: flown together as each alone."""
-    case = cases(3, starts=(start,), on_times=(0.5,), jitter=0.0)
-    widths = np.array([[0.5, 0.0, 0.3]])
-    together = fly(*case[:3], replace(case.pulses, on_times=widths))
-    for number in range(3):
-        one = slice(number, number + 1)
-        pulses = replace(case.pulses.some(one), on_times=widths[:, one])
-        alone = fly(case.bodies.some(one), case.rates[:, one], case.quaternion[:, one], pulses)
-        for of_all, single in zip(together, alone, strict=True):
-            assert_allclose(of_all[:, one], single, atol=1e-13)
+CHANGING = cases(30, starts=(0.5, 1.05, 1.1), on_times=(0.5, 0.2, 0.4), jitter=0.12)
+LEANS = np.tile([[-0.2], [0.1], [-0.3]], 30)
+ONE = cases(3, starts=(0.4,), on_times=(0.5,), jitter=0.0)
+WIDTHS = np.array([[0.5, 0.0, 0.3]])
 
 
-def test_pulses_that_change_their_order_in_some_cases() -> None:
-    case = cases(30, starts=(0.5, 1.05, 1.1), on_times=(0.5, 0.2, 0.4), jitter=0.12)
-    assert len({tuple(column) for column in np.argsort(case.pulses.edges, axis=0).T}) > 3
-    assert_flown_alike(case, range(0, 30, 6))
-    leans = np.tile([[-0.2], [0.1], [-0.3]], 30)
-    falling = case._replace(pulses=replace(case.pulses, leans=leans))
-    for number in range(0, 30, 6):
-        for alone, of_many in zip(falling.some([number]).fly(), falling.fly(), strict=True):
-            assert_allclose(alone[:, 0], of_many[:, number], atol=1e-13)
-
-
-def test_no_pulses_and_no_time_and_what_is_given_stays() -> None:
-    case = cases(3, starts=(), on_times=())
-    for flown, start in zip(case.fly(), (case.rates, case.quaternion), strict=True):
-        assert_array_equal(flown, start)
-    case, same = cases(5), cases(5)
-    case.fly()
-    assert_array_equal(case.rates, same.rates)
-    assert_array_equal(case.quaternion, same.quaternion)
-    assert_array_equal(case.pulses.starts, same.pulses.starts)
-    assert_array_equal(case.pulses.impulses, same.pulses.impulses)
-
-
-def test_blocks_hold_what_single_cases_give_and_the_same_block_the_same_bits() -> None:
-    case = cases(BLOCK + 3, on_times=(0.5, 0.0))
+@pytest.mark.parametrize(
+    ("case", "numbers"),
+    [
+        (CHANGING, range(0, 30, 6)),
+        (CHANGING._replace(pulses=replace(CHANGING.pulses, leans=LEANS)), range(0, 30, 6)),
+        (ONE._replace(pulses=replace(ONE.pulses, on_times=WIDTHS)), range(3)),
+        (cases(BLOCK + 3, on_times=(0.5, 0.0)), (0, BLOCK - 1, BLOCK, BLOCK + 2)),
+    ],
+    ids=["other orders", "torques that lean", "impulses in some", "more than a block"],
+)
+def test_cases_fly_together_as_each_alone(case: Case, numbers: Iterable[int]) -> None:
+    begun = case.rates.copy()
     flown = case.fly()
-    for number in (0, BLOCK - 1, BLOCK, BLOCK + 2):
+    assert_array_equal(case.rates, begun)
+    for number in numbers:
         for alone, of_many in zip(case.some([number]).fly(), flown, strict=True):
-            assert_allclose(alone[:, 0], of_many[:, number], atol=1e-14)
-    case = cases(2 * BLOCK)
-    half = slice(BLOCK, None)
-    for alone, of_many in zip(case.some(half).fly(), case.fly(), strict=True):
-        assert_array_equal(alone, of_many[:, half])
+            assert_allclose(alone[:, 0], of_many[:, number], atol=1e-13)
 
 
 def forced(case: Case, number: int) -> reference.Motion:
@@ -393,38 +339,6 @@ def test_disturbances_and_dissipation(
         assert_is(case.fly(), number, forced(case, number), 1e-11)
 
 
-@pytest.mark.deep
-@spread("moments", [SYMMETRIC, OBLATE], quick=1)
-def test_coasts_under_dissipation_end_in_flat_or_in_pure_spin(moments: Triple) -> None:
-    growth = math.copysign(1 / 40, moments[0] - moments[2])
-    case = cases(
-        6, moments, starts=(0.5, 200.0), on_times=(0.5, 0.0), forcing=Forcing(growth=growth)
-    )
-    case.rates[:2, 0] = 3.0  # far out already
-    case.pulses.impulses[1] *= 1e-3
-    assert_flown_alike(case, (0, 3), 1e-10)
-    momentum = case.fly()[0] * case.bodies.moments
-    tilt = np.degrees(np.arctan2(np.hypot(momentum[0], momentum[1]), momentum[2]))
-    assert np.all((tilt > 80.0) & (tilt < 90.0) if growth > 0.0 else tilt < 1.0)
-
-
-def test_a_long_free_coast_is_exact_and_motions_too_long_to_integrate_are_refused() -> None:
-    case = cases(4, starts=(1e4,), on_times=(0.0,), jitter=0.0)
-    case.pulses.impulses[:] = 0.0
-    rates, quaternion = case.fly()
-    for number in range(4):
-        A, _, C = case.bodies.moments[:, number].tolist()
-        first, second, spin = case.rates[:, number].tolist()
-        omega = complex(first, second)
-        after = arc(A, C, 0.0, case.quaternion[:, number], omega, spin, 1e4)[2]
-        assert (
-            reference.turned(attitude.matrix(after), attitude.matrix(quaternion[:, number])) < 1e-10
-        )
-        assert math.hypot(*rates[:2, number]) == pytest.approx(math.hypot(first, second), rel=1e-13)
-    with refused(Infeasible, "physics.cases-too-long"):
-        cases(2, TENSOR, starts=(2e5,), on_times=(1.0,), constant=np.array([0.0, 0.0, 1e-9])).fly()
-
-
 def test_cosine_and_sine_by_the_half_angle() -> None:
     angles = np.concatenate(
         [np.linspace(-400.0, 400.0, 2001), [0.0, 1e-300, math.pi, math.pi / 2, 1e-9]]
@@ -434,9 +348,7 @@ def test_cosine_and_sine_by_the_half_angle() -> None:
 
 @pytest.mark.weekly
 @pytest.mark.parametrize(("sense", "growth"), [(1.0, 3e-3), (-1.0, 3e-3), (1.0, -6e-3)])
-def test_few_turns_show_what_all_show(
-    sense: float, growth: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_few_turns_show_what_all_show(sense: float, growth: float) -> None:
     """Arcs of some 20 to 40 turns with dissipation,
     directions near the spin axis and away from it.
     """
@@ -466,18 +378,8 @@ def test_few_turns_show_what_all_show(
     )
     few, every = AxisWatch.of(directions, sense), AxisWatch.of(directions, sense)
     every._steps(here, lasts)
-    steps: list[int] = []
-    stepped = AxisWatch._steps
-
-    def counted(self: AxisWatch, begin: MotionStretch, duration: reference.Array) -> None:
-        steps.append(len(duration))
-        stepped(self, begin, duration)
-
-    monkeypatch.setattr(AxisWatch, "_steps", counted)
     few.motion(here, lasts)
     assert few.angles == pytest.approx(every.angles, abs=3e-5)
-    assert steps[0] < count // 2  # followed all the way
-    assert steps[1:] == [count - steps[0]] * 2
 
 
 def test_cases_with_pulses_in_different_orders_are_watched_as_each_alone() -> None:

@@ -28,8 +28,8 @@ from support.places import case
 import nutdamp
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import Comparison, Gain, Ground, cheapest, compare, recommend, usual
-from nutdamp.planning.notes import alternatives, comparison_warnings, reasons
+from nutdamp.planning.decision import Comparison, Ground, cheapest, compare, recommend, usual
+from nutdamp.planning.notes import Gain, alternatives, comparison_warnings, gains, reasons
 from nutdamp.planning.screening import FlownPlan
 from nutdamp.planning.verdict import Cases, Status
 from nutdamp.schemes import catalogue
@@ -438,7 +438,7 @@ def test_the_cheapest_plan_that_gains_much_for_little_more_is_an_alternative() -
     ]:
         for plans in ((best, *others), (*reversed(others), best)):
             found = recommend(plans)
-            other = found.alternatives.get(gain)
+            other = gains(present(found.plan), found.rivals).get(gain)
             assert (None if other is None else other.scheme) == named, (best, gain)
             assert found.plan is best or len(best.pulses) == 0
 
@@ -519,7 +519,8 @@ def test_optimal_keeps_a_spin_without_a_channel_for_it() -> None:
 )
 def test_examples_have_such_alternatives(name: str, gain: Gain) -> None:
     body = nutdamp.example(name)
-    found = compare(body, usual(body), timed=gain is Gain.COMMANDED)
-    pulses = present(found.recommended).pulses
-    assert (pulses.idealised, bool(pulses.blocks)) == (gain is Gain.REAL, False)
-    assert bool(found.recommendation.alternatives[gain].pulses.blocks) is (gain is Gain.COMMANDED)
+    found = compare(body, usual(body), timed=gain is Gain.COMMANDED).recommendation
+    best = present(found.plan)
+    assert (best.pulses.idealised, bool(best.pulses.blocks)) == (gain is Gain.REAL, False)
+    other = gains(best, found.rivals)[gain]
+    assert bool(other.pulses.blocks) is (gain is Gain.COMMANDED)

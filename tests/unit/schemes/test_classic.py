@@ -2,7 +2,6 @@
 
 import cmath
 import itertools
-import json
 import math
 import re
 from dataclasses import replace
@@ -34,7 +33,8 @@ from nutdamp.errors import SenselessOption
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics import driven, motion
+from nutdamp.physics import driven
+from nutdamp.physics import inertia as principal_moments
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.notes import plan_notes
@@ -130,14 +130,11 @@ def test_what_cannot_be_has_a_reason() -> None:
 
 @pytest.mark.parametrize("scheme", ["one-pulse", "four-pulse"])
 def test_the_horizon_that_is_named_is_long_enough(scheme: str) -> None:
-    """What ends there is the pulse that it takes, not the shortest that there is."""
-    for torque, shortest in itertools.product((3.0, 30.0, 300.0), (0.0, 0.02)):
-        jet = (channel("T", torque, 0.0, 0.0, min_on_time=shortest),)
+    for torque in (3.0, 30.0, 300.0):
+        jet = (channel("T", torque, 0.0, 0.0, min_on_time=0.02),)
         why = why_not((scheme, spinner(channels=jet, limits=Limits(horizon=0.3))))
-        named = present(re.search(r"would end at (\S+) s: set limits.horizon later", why), why)
-        feasible_by(
-            scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]) * (1.0 + 1e-5)))
-        )
+        named = present(re.search(r"limits.horizon = (\S+) s is long enough", why), why)
+        feasible_by(scheme, spinner(channels=jet, limits=Limits(horizon=float(named[1]))))
 
 
 @pytest.mark.parametrize(
@@ -382,7 +379,7 @@ def test_channels_at_the_mounting_angle_need_no_more_than_the_floor() -> None:
         spinner().transverse_rate,
         rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait,
     )
-    angle = rigid_body.mounting_angle(120.0, 80.0, omega, 3.0)
+    angle = principal_moments.mounting_angle(120.0, 80.0, omega, 3.0)
     turns = 2000.0 * np.exp(1j * np.array([0.0, math.pi, angle, angle + math.pi]))
     pair = tuple(channel(f"T{number}", one.real, one.imag, 0.0) for number, one in enumerate(turns))
     made = feasible_by("two-pulse", spinner(channels=pair)).pulses
@@ -838,10 +835,10 @@ def test_within_rounding_of_a_sphere_plan_and_check_agree_that_it_is_one() -> No
 def test_on_either_side_of_the_tolerance_every_scheme_answers(off: float, scheme: str) -> None:
     """The sphere within it; beyond it a body whose nutation takes years to turn in the body."""
     for first, second, third in ((1 + off, 1, 1), (1, 1 + 2 * off, 1 + off), (1, 1, 1 - off)):
-        if off > rigid_body.DEGENERATE and first != second:
+        if off > principal_moments.DEGENERATE and first != second:
             continue  # no spin about an axis of the middle moment
         moments = 100.0 * first, 100.0 * second, 100.0 * third
-        assert (Inertia(moments).a == 0.0) == (off <= rigid_body.DEGENERATE)
+        assert (Inertia(moments).a == 0.0) == (off <= principal_moments.DEGENERATE)
         for plain in (
             spinner(moments=moments, phase=math.pi, channels=cross(8.0)),
             spinner(moments=moments, phase=0.7, channels=cross(8.0), spin=-3.0),
@@ -933,36 +930,6 @@ def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> No
     assert waits[-1] > 1.5 * waits[0]
 
 
-@pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse", "four-pulse", deep("optimal")])
-def test_coasts_take_no_steps(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With dissipation, only the pulses are integrated: a long wait between them costs nothing."""
-    spans = list[float]()
-    polynomials = motion.polynomials
-
-    def counted(here: motion.MotionStretch, duration: float, most: int) -> object:
-        spans.append(duration)
-        return polynomials(here, duration, most)
-
-    monkeypatch.setattr(motion, "polynomials", counted)
-    body = spinner(channels=jets(5.0, 3, 0.5), limits=Limits(horizon=400.0))
-    assert planning.plan(replace(body, dissipation=300.0), scheme).feasible
-    assert spans
-    assert max(spans) < 0.501  # the longest pulse, and a little more for difference quotients
-
-
-@pytest.mark.deep
-def test_no_bound_is_claimed_under_dissipation(run: Run, plans_shared: None) -> None:
-    """An oblate body damps itself: there are schedules below A|ω0|, and they are found."""
-    command = "plan", "-v", str(case("oblate-dissipation.yaml")), "--scheme", "optimal"
-    shown = run(*command).stdout
-    check_text(
-        "dissipation.no-bound",
-        "\n".join(line for line in shown.splitlines() if "least impulse" in line),
-    )
-    (planned,) = json.loads(run(*command, "--json", "-").stdout)["plans"]
-    assert planned["total_impulse_Nms"] < 0.65 * planned["least_impulse_Nms"]
-
-
 @pytest.mark.deep
 @pytest.mark.parametrize(("A", "C"), [(80.0, 120.0), (120.0, 80.0)], ids=["oblate", "prolate"])
 def test_the_first_order_least_knows_dissipation(A: float, C: float) -> None:
@@ -977,20 +944,6 @@ def test_the_first_order_least_knows_dissipation(A: float, C: float) -> None:
     assert Outcome(one.spacecraft, one.pulses).nutation < 1e-9
 
 
-@pytest.mark.weekly
-def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() -> None:
-    """An oblate body, 30 time constants of horizon: the longer it waits, the less it costs."""
-    body = replace(
-        spinner(80.0, 120.0, channels=jets(400.0, 3), limits=Limits(horizon=600.0)),
-        dissipation=20.0,
-    )
-    one = planning.plan(body, "optimal")
-    assert present(one.flown, infeasibility(one)).nutation < NEARLY_NOTHING
-    assert all(pulse.resolved for pulse in one.pulses)
-    assert one.pulses.total_impulse < 1e-3 * body.least_impulse
-    assert present(one.pulses.bounds).within < 300.0  # the least within as long as the search looks
-
-
 @spread(
     ("name", "options", "status", "said"),
     [
@@ -998,7 +951,7 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
             "crash-hang-near-sphere-dissipation",
             (),
             3,
-            r"dissipation damps the nutation before the channels.*? it",
+            r"no pair of the channels.*? damps it",
         ),
         ("crash-dissipation-near-sphere-overflow", (), 3, ""),
         ("crash-halfcone-trim-crash", (), 0, ""),

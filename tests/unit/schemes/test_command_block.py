@@ -15,7 +15,7 @@ from support import places, reference
 from support.builders import aimed, channel, codes, cross, noted, one_of, present, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text, refused
-from support.spinners import FILE, commanded, flown_by_reference, some_body, swells, through
+from support.spinners import FILE, commanded, flown_by_reference, some_body, through
 
 import nutdamp
 from nutdamp import load
@@ -28,8 +28,7 @@ from nutdamp.flight.cones import aspects
 from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.end_state import left_by
 from nutdamp.physics import attitude, motion, precession
-from nutdamp.physics.motion import MotionStretch
-from nutdamp.physics.series import Bodies, Forcing
+from nutdamp.physics.motion import Bodies, MotionStretch
 from nutdamp.physics.sky import SunPulseClock
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
@@ -277,20 +276,9 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(
     search = BlockSearch(body, usable(body), 1)
     singles = search.continued(search.start, last=True)
     rows = np.argsort(singles.share)[:200]
-    search.flights.fly([search.blocks(singles, int(row)) for row in rows], [0.0] * len(rows))
+    search.flights.fly(search.blocks(singles, rows))
     least = search.flights.best().rank[1]
     assert planned(body, ONE, met=False)._severity <= 1.02 * max(least, 1.0)
-
-
-@pytest.mark.weekly
-def test_more_blocks_are_tried_where_one_block_does_not_do() -> None:
-    """Two or three do better, and --max-blocks keeps to one."""
-    tight = replace(some_body(2), requirement=within(0.05, 0.05))
-    plan, single = planned(tight, met=False), planned(tight, ONE, met=False)
-    assert len(single.pulses.blocks) == 1
-    assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
-    assert plan._severity <= single._severity
-    assert planned(replace(some_body(2), requirement=within(0.1, 0.1)), met=False)._severity < 2.0
 
 
 @pytest.mark.deep
@@ -428,15 +416,6 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
         "blocks.why-not",
         "\n".join(f"{name}: {infeasibility(plan)}" for name, plan in plans.items()),
     )
-
-
-def test_a_delay_just_below_none_is_none_without_a_sign() -> None:
-    body = a_turn()
-    delays = BlockSearch(body, body.channels, 1).commanded(
-        np.array([-0.3, 0.3]) * present(body.commands).delay_step
-    )
-    assert delays.tolist() == [0.0, 0.0]
-    assert not np.signbit(delays).any()
 
 
 def test_only_of_a_grid_that_is_searched_whole_is_no_sequence_said_to_be_better() -> None:
@@ -676,39 +655,6 @@ def test_sun_pulses_seen_one_by_one_are_those_seen_at_once_for_the_work_of_one_f
     assert sum(integrated) < 1.1 * apart
 
 
-def test_a_sun_whose_azimuth_turns_back_is_found_or_lost_within_few_turns(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """At large nutation Newton's steps go to and fro over a turn; they took five
-    times as long."""
-    count, turned = 64, list[float]()
-    nutation, phase = np.radians(70.0), np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
-    moments = np.array([70.0, 70.0, 90.0])[:, None]
-    across = np.tan(nutation) * 90.0 / 70.0
-    rates = np.array([across * np.cos(phase), across * np.sin(phase), np.ones(count)])
-    quaternion = np.zeros((4, count))
-    quaternion[0] = 1.0
-    bodies = Bodies(np.repeat(moments, count, axis=1), np.zeros(3), Forcing(growth=0.01))
-    start = MotionStretch(bodies, np.zeros(count), rates, quaternion)
-    clock = SunPulseClock(start, np.repeat(np.eye(3)[:, :1], count, axis=1), 1.0, 0.4)
-    advance = motion.advance
-
-    def moved(stretch: motion.MotionStretch, duration: Any) -> None:
-        turned.append(float(np.max(np.abs(duration))))
-        advance(stretch, duration)
-
-    monkeypatch.setattr(motion, "advance", moved)
-    for number in range(1, 6):
-        before = clock.lost
-        pulse = clock.sun_pulse(number)
-        body = attitude.rotate(attitude.conjugate(pulse.quaternion.T), np.array([1.0, 0.0, 0.0]))
-        off = np.angle(np.exp(1j * (np.arctan2(body[:, 1], body[:, 0]) - 0.4)))
-        assert np.abs(off[~clock.lost]).max(initial=0.0) < 1e-8
-        assert np.all(clock.lost >= before)
-    assert 0 < np.count_nonzero(clock.lost) < count
-    assert sum(turned) < 2.5 * float(pulse.since.max())
-
-
 @pytest.mark.parametrize("apart", [0.4, 1.0, 2.0, 4.0])
 def test_sun_pulses_near_the_axis_are_found(apart: float) -> None:
     """The Sun ``apart`` deg outside of the cone of the axis about H comes each turn: at moments by
@@ -866,71 +812,6 @@ def test_commands_begin_at_the_delay_after_the_sun_pulses_of_the_motion_that_the
     assert any(
         begins < one < ends for one in moments for begins, ends in (pulse.thrust for pulse in made)
     )
-
-
-def one_block(body: nutdamp.Spacecraft) -> planning.Plan:
-    plan = planning.plan(body, "command-block", nutdamp.Options(max_blocks=1))
-    assert len(plan.pulses.blocks) == 1
-    return plan
-
-
-@pytest.mark.weekly
-def test_a_valve_without_delays_changes_no_block_and_a_late_one_the_delay_alone() -> None:
-    """Thrust as long as the command, 15 ms late: the delay is that much less,
-    on its steps of 5 ms.
-    """
-    body = aimed(at_rest(), 8.5, 40.0)
-    plain, valved, slow = map(one_block, (body, through(Trapezoid(), body), through(SLOW, body)))
-    assert plain.pulses.blocks == valved.pulses.blocks
-    assert [pulse.t for pulse in plain.pulses] == pytest.approx(
-        [pulse.t for pulse in valved.pulses], abs=1e-10
-    )
-    (block,), (before,) = slow.pulses.blocks, plain.pulses.blocks
-    assert (block.count, block.width) == (before.count, before.width)
-    assert block.delay == pytest.approx(before.delay - 0.015, abs=1e-9)
-    assert slow._flight.residual.nutation == pytest.approx(
-        plain._flight.residual.nutation, abs=1e-6
-    )
-
-
-def missed(body: nutdamp.Spacecraft, made: Schedule) -> float:
-    """H off the target, rad, by the reference from start and on-time as loaded alone."""
-    moments = body.inertia.moments
-    start = attitude.matrix(body.initial.quaternion)
-    motion = reference.fly(moments, body.omega0, swells(body, made), made.end + 0.1, start)
-    return reference.angle(reference.momentum(moments, motion), body.target_axis)
-
-
-@pytest.mark.weekly
-@pytest.mark.parametrize("valve", [SLOW, UNEVEN])
-def test_planned_with_valves_blocks_leave_what_the_grid_allows_and_without_them_much(
-    valve: Valve,
-) -> None:
-    """Pulses of about 50 ms, valves 15 ms late. No train of equal pulses on a grid ends on the
-    target to 1e-6 deg.
-
-    Half a step of the delay (5 ms) turns the heading by half a step of the spin, and half a pulse
-    may be missing or too much: within these the end of H lies, and blocks planned without the
-    valves miss it by the delay and by what their thrust lacks.
-    """
-    body = aimed(at_rest(), 3.0, 40.0)
-    way = math.radians(3.0)
-    body = replace(
-        body, commands=replace(present(body.commands), widths=np.arange(0.046, 0.0541, 0.001))
-    )
-    slow = through(valve, body)
-    spin = abs(body.spin)
-    aware, unaware = one_block(slow), one_block(body)
-    (block,), step = aware.pulses.blocks, way / aware.pulses.blocks[0].count
-    assert 0.045 < block.width < 0.055
-    assert aware.flown is not None
-    assert missed(slow, aware.pulses) == pytest.approx(aware.flown.axis_error, abs=1e-8)
-    assert aware.flown.axis_error < 0.5 * spin * 0.005 * way + 0.5 * step
-    assert aware.flown.nutation < 2.0 * step
-    off = missed(slow, fired(slow, unaware.pulses.blocks))
-    assert off > max(
-        0.9 * abs(way * spin * 0.015), 1.9 * aware.flown.axis_error
-    )  # the heading, by 15 ms of the spin
 
 
 TANK = Tank(propellant=0.3, pressure=22e5, final_pressure=8e5, exponent=1.0)

@@ -22,6 +22,7 @@ from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.search import Search
+from nutdamp.spacecraft import directions
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Bounds, Schedule, channel_pulse
@@ -133,8 +134,8 @@ def test_no_plan_of_any_scheme_is_below_its_bound_for_what_it_leaves(first: int,
         body = layout(rng, axial=(0.0, 0.0, 0.05, 0.4)[seed % 4])
         schemes = "one-pulse two-pulse four-pulse"
         if seed % 3 == 0:
-            axis = body.direction_in_n(
-                math.radians(rng.uniform(1, 120)), float(rng.uniform(0, 6.28))
+            axis = directions.direction_in_n(
+                body, math.radians(rng.uniform(1, 120)), float(rng.uniform(0, 6.28))
             )
             body = replace(body, goal=Goal(axis))
             schemes = "two-pulse half-cone rhumb-line four-pulse"
@@ -218,22 +219,6 @@ def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
     assert proved(with_plenty, cost=cost) == pytest.approx(body.least_impulse, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_axial_torque_lowers_the_bound_no_further_than_free_phases(seed: int) -> None:
-    body = layout(np.random.default_rng(seed), axial=0.3)
-    still = replace(
-        body, channels=tuple(channel(one.name, *one.torque[:2], 0.0) for one in body.channels)
-    )
-    fixed = bounds.rigorous(still, prices(body), 1.0, bounds.Allowed(), shift=False)
-    free = body.least_impulse / max(
-        abs(one.transverse) / prices(body)[one.name] for one in body.channels
-    )
-    for share in (0.0, 1.0, 100.0):
-        if fixed is None:  # there is no solution for this layout
-            return
-        assert free * (1.0 - TIGHT) <= proved(body, cost=share * fixed) <= fixed * (1.0 + TIGHT)
-
-
 @pytest.mark.parametrize(
     ("degrees", "turn"),
     [(0.0, 40.0), deep(10.0, 5.0), deep(10.0, 60.0), deep(45.0, 30.0), deep(45.0, 160.0)],
@@ -243,7 +228,7 @@ def test_the_way_of_h_is_the_shortest_round_its_sphere(degrees: float, turn: flo
     body = spinner(degrees=degrees, channels=cross(8.0))
     beta = math.radians(turn)
     body, r = (
-        replace(body, goal=Goal(body.direction_in_n(beta, 1.0))),
+        replace(body, goal=Goal(directions.direction_in_n(body, beta, 1.0))),
         body.inertia.C * abs(body.spin),
     )
     begin = np.linalg.norm(body.momentum)
@@ -282,45 +267,33 @@ def test_no_rigorous_bound_is_told_where_none_is_known_to_hold(other: Spacecraft
     assert made.pulses.bounds.first_order is not None
 
 
-def test_ticks_count_what_they_leave() -> None:
-    """Pulses on coarse ticks leave something; the bound is of schedules that leave as much."""
-    body = replace(SPINNER, limits=Limits(horizon=60.0, tick=0.02))
-    made = plan(body, "four-pulse")
-    assert made.flown is not None
-    assert made.flown.nutation > 1e-6
-    cost = made.pulses.total_impulse
-    less = body.inertia.C * body.spin * math.tan(made.flown.nutation)
-    bound = proved(body, bounds.Allowed(made.flown.nutation), cost=cost)
-    assert bound <= cost
-    assert proved(body, cost=cost) - bound == pytest.approx(less, rel=1e-6)
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize(
-    ("first", "lasting"),
-    [(0, False), (0, True), *(weekly(at, one) for at in (8, 16, 24) for one in (False, True))],
+@spread(
+    ("seed", "lasting"),
+    [(seed, one) for seed in range(32) for one in (False, True)],
+    quick=6,
+    deep=16,
 )
-def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(
-    first: int, lasting: bool
+def test_the_first_order_bound_and_the_program_are_those_of_a_dense_grid(
+    seed: int, lasting: bool
 ) -> None:
-    """Impulses at moments of a grid for strong torques; for weak ones,
-    on-times in cells of a grid.
+    """Impulses at moments of a grid for strong torques; for weak ones, on-times in its cells.
+
+    Its moments are some of all moments, so its optimum lies above; hardly, where it is fine.
     """
-    solved = 0
-    for seed in range(first, first + 8):
-        body = layout(np.random.default_rng(seed), count=6)
-        factor = 10.0 ** np.random.default_rng(seed).uniform(-2.5, -1.0) if lasting else 1e6
-        body = replace(
-            body, channels=tuple(channel(one.name, *(factor * one.torque)) for one in body.channels)
-        )
-        program, solution = solved_program(body)
-        if solution.unmet > 1e-9:
-            continue
-        found = bounds.first_order(program, solution.prices).bound
-        solved = solved + 1
-        assert found <= grid_optimum(body, 1500, (body.spin,), lasting=lasting) * (1.0 + TIGHT)
-        assert solution.cost * (1.0 - 5e-3) <= found <= solution.cost * (1.0 + TIGHT)
-    assert solved >= 2
+    body = layout(np.random.default_rng(seed), count=6)
+    factor = 10.0 ** np.random.default_rng(seed).uniform(-2.5, -1.0) if lasting else 1e6
+    weaker = (channel(one.name, *(factor * one.torque)) for one in body.channels)
+    body = replace(body, channels=tuple(weaker))
+    program, solution = solved_program(body)
+    optimum = grid_optimum(body, 6000, (body.spin,), lasting=lasting)
+    assert lasting or (solution.unmet > 1e-9) == math.isinf(optimum)
+    if solution.unmet > 1e-9:
+        return
+    found = bounds.first_order(program, solution.prices).bound
+    assert found <= optimum * (1.0 + TIGHT)
+    assert solution.cost * (1.0 - 5e-3) <= found <= solution.cost * (1.0 + TIGHT)
+    if not lasting and body.horizon * body.fastest < 80.0:
+        assert solution.cost == pytest.approx(optimum, rel=1e-4)
 
 
 def solved_program(body: Spacecraft) -> tuple[Program, Solution]:

@@ -3,7 +3,6 @@ divided pulses."""
 
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,100 +15,34 @@ from support.cases import deep, spread, weekly
 from support.checker import violations
 from support.commands import rows as rows_of
 from support.golden import check_text
-from support.optimal import as_found, flies, random_layout
-from support.rivals import unequal_body
+from support.optimal import as_found, flies
 
 import nutdamp
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
-from nutdamp.physics import attitude
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.plan import plan
-from nutdamp.schemes import correction, two_pulse
+from nutdamp.schemes import correction
 from nutdamp.schemes.catalogue import (
     SCHEMES,
     OptimalOptions,
     Options,
     SchemeOptions,
-    TwoPulseOptions,
 )
-from nutdamp.schemes.optimal import alternatives, multistart, problem
-from nutdamp.schemes.optimal import search as optimal
+from nutdamp.schemes.optimal import alternatives, multistart
 from nutdamp.schemes.optimal.descent import Descent, Task
-from nutdamp.schemes.optimal.linear_program import Burn
 from nutdamp.schemes.optimal.refinement import EndEquations
-from nutdamp.schemes.optimal.search import DEARER, HALVINGS, Search, by_program
-from nutdamp.schemes.sequential import at_hand, bounded_by
-from nutdamp.spacecraft.constraints import keeps_limits
-from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.constraints import at_hand, bounded_by, keeps_limits
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
-from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 BODY = spinner(channels=cross(8.0), limits=Limits(horizon=400.0))
 """400 s are 128 inertial nutation periods, so that the horizon can be halved six times."""
 
 NOTHING_DAMPS = places.case("nothing-damps.yaml").read_text(encoding="utf-8")
 PLAIN = OptimalOptions()
-
-
-def settle(
-    monkeypatch: pytest.MonkeyPatch, schedules: dict[float, Schedule], **others: Schedule | None
-) -> list[float]:
-    """Let the program lead to ``schedules`` within each horizon, else to nothing, and ``others`` of
-    the attempts to these; the horizons that were looked at.
-    """
-    tried: list[float] = []
-
-    def by_program(search: Search, _: Schedule | None) -> Schedule | None:
-        tried.append(search.spacecraft.horizon)
-        return schedules.get(search.spacecraft.horizon)
-
-    def gives(made: Schedule | None) -> Callable[..., Schedule | None]:
-        def attempt(*_: object) -> Schedule | None:
-            return made
-
-        return attempt
-
-    monkeypatch.setattr(optimal, "by_program", by_program)
-    for name, made in ({"by_descent": None, "by_more_pulses": None} | others).items():
-        monkeypatch.setattr(optimal, name, gives(made))
-    return tried
-
-
-def dearer(made: Schedule, share: float) -> Schedule:
-    return Schedule(
-        tuple(
-            replace(one, on_time=one.on_time * share, impulse=one.impulse * share) for one in made
-        )
-    )
-
-
-@pytest.mark.deep
-def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or_is_dear(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Halved down to a period; where what is found is dear, three times or until one is not."""
-    search = Search(BODY, PLAIN)
-    pair = two_pulse.schedule(BODY, TwoPulseOptions())
-    for known in ({400.0: dearer(pair, 2.0)}, {}):
-        tried = settle(monkeypatch, known)
-        made = present(search.cheapest())
-        assert search.price(made) <= search.price(pair) * (
-            1.0 + 1e-9
-        )  # another scheme was the start
-    halves = int(math.log2(400.0 / BODY.inertial_period))
-    assert tried == [400.0 * 0.5**turn for turn in range(halves + 1)]
-    assert halves > HALVINGS
-    dear = {400.0 * 0.5**turn: dearer(pair, 3.0 - 0.1 * turn) for turn in range(7)}
-    tried = settle(monkeypatch, dear, by_other_schemes=None)
-    assert search.cheapest() is dear[50.0]
-    assert tried == [400.0, 200.0, 100.0, 50.0]
-    cheap = dearer(pair, (1.0 + 0.5 * DEARER) * search.first.cost / search.price(pair))
-    tried = settle(monkeypatch, {400.0: dearer(cheap, 2.0), 200.0: cheap}, by_other_schemes=None)
-    assert search.cheapest() is cheap
-    assert tried == [400.0, 200.0]
 
 
 @pytest.mark.deep
@@ -212,45 +145,6 @@ def test_several_short_pulses_in_each_half_turn_damp(
         0.9 * max(one.min_on_time for one in body.channels), body.limits.gap - 1e-9
     )
     assert plan(body, "four-pulse")._severity > math.radians(degrees - 4.2)
-
-
-@pytest.mark.parametrize(
-    ("longest", "gap", "shortest"), [(0.3, 0.0, 0.0), (0.21, 0.1, 0.0), (0.5, 0.02, 0.13)]
-)
-def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(
-    longest: float, gap: float, shortest: float
-) -> None:
-    body = spinner(
-        channels=cross(8.0, min_on_time=shortest, max_on_time=longest),
-        limits=Limits(horizon=30.0, gap=gap),
-    )
-    program = problem.Problem(body, PLAIN).program()
-    long = tuple(Burn(body.channels[1], t, on) for t, on in ((2.0, 1.1), (5.3, 0.7), (17.0, 2.0)))
-    assert problem._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
-    assert not program.forbidden[[0, 2, 3]].any()  # nothing is too long there
-    runs = [
-        (key, len(list(group))) for key, group in itertools.groupby(program.forbidden[1].tolist())
-    ]
-    assert max(count for key, count in runs if not key) * program.width <= longest + 1e-12
-    assert (
-        min(count for key, count in runs[1:-1] if key) * program.width >= max(gap, shortest) - 1e-12
-    )
-    for burn in long:  # time is left for it from its begin to its end, and a half of it beside it
-        near = np.abs(program.centres - burn.t) <= 0.75 * burn.on_time
-        assert np.count_nonzero(~program.forbidden[1] & near) * program.width >= 0.6 * burn.on_time
-
-
-@pytest.mark.deep
-def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> None:
-    body = random_layout(153)
-    search = Search(body, PLAIN)
-    before = present(by_program(search, None))
-    after = present(search.lowered(before))
-    assert search.price(after) < search.price(before) * (1.0 - 1e-4)
-    assert [one.channel for one in after] == [one.channel for one in before]
-    assert math.degrees(search.left(search.flown(after))) < 1e-9
-    ticked = Search(replace(body, limits=replace(body.limits, tick=1e-3)), PLAIN)
-    assert ticked.lowered(before) is before  # ticks decide what a schedule leaves
 
 
 @pytest.mark.parametrize(
@@ -377,25 +271,6 @@ def test_every_limit_is_kept(body: Spacecraft) -> None:
     )
 
 
-@pytest.mark.weekly
-def test_on_times_are_none_or_at_least_the_least() -> None:
-    free = strong(5.0, 1.0)
-    made = plan(free, "optimal").pulses
-    least = 3.0 * min(pulse.on_time for pulse in made)
-    bounded = tuple(channel(one.name, *one.torque, min_on_time=least) for one in free.channels)
-    assert flies(replace(free, channels=bounded), left=EXACT).pulses.cost >= made.cost * (
-        1.0 - 1e-6
-    )
-
-
-@pytest.mark.deep
-def test_the_same_plan_every_time() -> None:
-    one, two = (multistart.schedules(task_of(strong()))[0] for _ in range(2))
-    assert [(pulse.start, pulse.on_time) for pulse in one] == [
-        (pulse.start, pulse.on_time) for pulse in two
-    ]
-
-
 @pytest.mark.deep
 @pytest.mark.parametrize(("horizon", "count"), [(1.0, 2), (400.0, 40)])
 def test_the_work_is_bounded(horizon: float, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -415,30 +290,35 @@ def test_the_work_is_bounded(horizon: float, count: int, monkeypatch: pytest.Mon
     assert sum(calls) < 400_000
 
 
+LEANING = (*cross(3e2), channel("lean", 110.0, 150.0, 50.0))
+"""Channels of which one changes the spin."""
+
+
 @pytest.mark.parametrize("seed", range(4))
-def test_misses_are_those_of_the_reference_integrator(seed: int) -> None:
-    body = replace(strong(30.0, 4.0), channels=cross(3e2))
-    task = task_of(body)
+@pytest.mark.parametrize("kicks", [0, 1, 24])
+def test_misses_are_those_of_the_reference_integrator(seed: int, kicks: int) -> None:
+    """Through real widths, or as kicks spread evenly over the pulses."""
+    body = replace(strong(30.0, 4.0), channels=LEANING)
+    task = task_of(body, EndEquations(spin=True))
     sequences, x = multistart.random_starts(task, 4, 1, np.random.default_rng(seed))
     which, (starts, on_times) = sequences.which[0].tolist(), np.split(x[0], 2)
-    fired = zip(which, starts, on_times, strict=True)
-    pulses = (channel_pulse(body.channels[one], start + 0.5 * on, on) for one, start, on in fired)
+    pulses = list[Pulse]()
+    for one, start, on in zip(which, starts, on_times, strict=True):
+        whole = channel_pulse(body.channels[one], start + 0.5 * on, on)
+        shares = (np.arange(kicks) + 0.5) / kicks if kicks else np.zeros(0)
+        pulses += [pulse(start + on * share, 0.0, whole.impulse / kicks) for share in shares]
+        pulses += [] if kicks else [whole]
     flown = Outcome(body, Schedule(tuple(pulses)))
     momentum = np.asarray(body.inertia.moments) * flown.motion.rates
     size = float(np.linalg.norm(body.momentum))
     after = flown.motion.rotation @ momentum
-    misses = task.misses(sequences.which, x, 0)[0]
+    misses = task.misses(sequences.which, x, kicks)[0]
     assert misses[:2] == pytest.approx(momentum[:2] / size, abs=1e-11)
-    assert np.linalg.norm(misses[2:]) == pytest.approx(np.linalg.norm(after[:2]) / size, abs=1e-11)
-    # Kicks close in on it as the square of their number; they end half a kick earlier, which turns
-    # ω in the body.
-    sizes = [
-        np.linalg.norm(task.misses(sequences.which, x, kicks)[0].reshape(2, 2), axis=1)
-        for kicks in (0, 4, 8, 16)
-    ]
-    away = [float(np.abs(one - sizes[0]).max()) for one in sizes[1:]]
-    assert away[0] / away[1] == pytest.approx(4.0, rel=0.2)
-    assert away[1] / away[2] == pytest.approx(4.0, rel=0.1)
+    assert np.linalg.norm(misses[2:4]) == pytest.approx(np.linalg.norm(after[:2]) / size, abs=1e-11)
+    assert misses[4] == pytest.approx(
+        (momentum[2] - body.inertia.axial(body.spin)) / size, abs=1e-11
+    )
+    assert task.misses(sequences.which[:0], x[:0], kicks).shape == (0, 5)
 
 
 @pytest.mark.parametrize(
@@ -602,31 +482,3 @@ def test_no_schedule_ends_earlier(seed: int) -> None:
     assert made.feasible
     assert Outcome(body, made.pulses).nutation < 1e-9
     assert made.end < 1.03 * least_end(body)
-
-
-# --- flights of many sequences at once: all stretches together are what they are in turn
-
-LEANING = (*cross(8.0), channel("lean", 3.0, 4.0, 1.5))
-"""Channels of which one changes the spin."""
-
-
-@pytest.mark.parametrize("channels", [cross(8.0), LEANING])
-@pytest.mark.parametrize("kicks", [0, 1, 24])
-def test_all_stretches_at_once_are_those_in_turn(channels: tuple[Channel, ...], kicks: int) -> None:
-    task = Task(spinner(channels=channels), EndEquations(), channels, np.ones(len(channels)))
-    draw = np.random.default_rng(1)
-    which = draw.integers(len(channels), size=(9, 5))
-    x = np.hstack(
-        [3.0 * np.arange(5) + draw.uniform(0.0, 1.0, (9, 5)), draw.uniform(0.0, 1.8, (9, 5))]
-    )
-    (momentum, turn), (expected, turned) = (
-        task._together(which, x, kicks),
-        task._in_turn(which, x, kicks),
-    )
-    size = np.abs(expected).max()
-    assert np.abs(momentum - expected).max() < 1e-13 * size
-    there, here = (attitude.rotate(q.T, h.T) for q, h in ((turn, momentum), (turned, expected)))
-    assert np.abs(there - here).max() < 1e-13 * size
-    unequal = Task(unequal_body(1)[0], EndEquations(), channels, np.ones(len(channels)))
-    for each in (task, unequal):
-        assert each.misses(which[:0], x[:0], kicks).shape == (0, len(EndEquations().chosen))
