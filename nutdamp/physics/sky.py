@@ -303,8 +303,7 @@ class SunPulseClock:
     from axis 1, ``sense`` the sign of the spin. ``mount`` (3, 3, n) takes vectors in body axes to
     those in which the sensor has its place; None: they are the same. ``time`` (n,) s is that of the
     last computed Sun pulse; there was none where ``lost`` (n,): the Sun is too near to the axis to
-    go round. ``over`` (n,) s: end of the last pulse, command and thrust. ``moves`` counts steps of
-    Newton's method, ``looked_back`` those of them to Sun pulses under thrust.
+    go round. ``over`` (n,) s: end of the last pulse, command and thrust.
     """
 
     def __init__(
@@ -327,7 +326,6 @@ class SunPulseClock:
         self._fired_at = self._earlier = 0
         self.time = start.since + (ahead - CIRCLE) / self._pace
         self.lost = np.zeros(len(start.since), dtype=bool)
-        self.moves = self.looked_back = 0
 
     @property
     def here(self) -> MotionStretch:
@@ -450,10 +448,8 @@ class SunPulseClock:
             cases = np.flatnonzero((sun_pulse.since < over.since) & ~self.lost)
             if not len(cases):
                 return
-            before = self.moves
             start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
             again = self._root(start, pace[cases], self.sun[:, cases])
-            self.looked_back += self.moves - before
             for whole, part in zip(sun_pulse[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
@@ -504,7 +500,6 @@ class SunPulseClock:
             )
             time = np.where(apart & stuck, 0.5 * (low[rows] + high[rows]), time)
             moved = some.moved(time)
-            self.moves += 1
             pending[rows] &= apart & (moved.since != some.since)
             if few:
                 for whole, part in zip(here[1:4], moved[1:4], strict=True):
