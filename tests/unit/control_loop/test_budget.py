@@ -126,7 +126,8 @@ def check_budget(body: Spacecraft, made: Loop, cycles: int, seeds: int, least: i
 
 @spread("name", EXACT, quick=1, deep=2)
 def test_a_budget_is_that_of_a_long_flight(name: str) -> None:
-    check_budget(*EXACT[name], 24, 1, 20)
+    """Of nine samples a period 24 cycles have 1.2 % fewer pulses than 200, 100 have 1.1 % more."""
+    check_budget(*EXACT[name], 100, 1, 80)
 
 
 @pytest.mark.weekly
@@ -184,11 +185,14 @@ def test_of_two_limit_cycles_the_budget_is_of_the_one_that_the_loop_falls_into(
     (held,) = budget(body).held
     assert held.cycle is not None
     assert (held.cycle.cycles > 0.0, present(held.other).cycles > 0.0) == (pauses, not pauses)
-    run = fly(body, made, 3000.0, seed=2)
+    run = fly(body, made, 6000.0, seed=2)
     assert bool(run.quiet) is pauses
     if not pauses:
+        # 5,000 s, cut into tens, scatter by 5 %: their mean is known to 1.5 %.
+        doubt = math.hypot(held.cycle.doubt, 0.015)
         later = sum(each.pulse.t > 1000.0 for each in run.fired)
-        assert held.cycle.pulses == pytest.approx(later / 2000.0, rel=0.02)
+        assert doubt < 0.025
+        assert held.cycle.pulses == pytest.approx(later / 5000.0, rel=3.0 * doubt)
         assert present(held.other).pulses < 0.01 * held.cycle.pulses
 
 
@@ -220,14 +224,14 @@ def test_a_budget_is_of_the_state_in_which_the_loop_of_the_file_ends(
 
 @pytest.mark.deep
 def test_chains_that_change_over_are_told_by_their_share() -> None:
-    """Most fall quiet; one firing in a hundred leaves what no pulse lowers, and they never do
-    again.
+    """Nearly all fall quiet; one cycle in a thousand leaves what no pulse lowers, and they never do
+    again: of 59 loops flown alone, over 404 cycles, none.
     """
     body = nutdamp.load(CASES / "budget-bistable.yaml")
-    (quiet, most), (never, least) = Cycles(body, present(body.loop)).attractors(0j, 64, 17)
+    (quiet, most), (never, least) = Cycles(body, present(body.loop)).attractors(0j, 128, 17)
     assert (quiet.cycles > 0.0, never.cycles) == (True, 0.0)
     assert most + least == 1.0
-    assert 0.02 < least < 0.25
+    assert 1.0 / 128.0 <= least < 0.05
 
 
 @pytest.mark.deep
@@ -354,7 +358,8 @@ def test_a_tank_lasts_as_long_as_its_propellant() -> None:
     # same impulse.
     assert present(falling.lasts) == pytest.approx(held.lasts, rel=0.6)
     assert present(falling.lasts) != pytest.approx(held.lasts, rel=0.01)
-    assert cycle_of(steady, loop(gyro()), used=1.0).pulses == cycle_of(steady, loop(gyro())).pulses
+    half_full = cycle_of(steady, loop(gyro()), used=1.0)
+    assert half_full.pulses == pytest.approx(cycle_of(steady, loop(gyro())).pulses, rel=1e-9)
 
 
 def spent(*_: object) -> float:

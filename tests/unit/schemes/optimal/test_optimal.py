@@ -235,6 +235,14 @@ def test_without_axial_torque_a_spin_is_refused_with_its_reason() -> None:
     )
 
 
+@pytest.mark.deep
+def test_least_time_ends_sooner_and_nothing_ends_much_sooner() -> None:
+    soon, cheap = (flies(within(30.0), least=what).pulses for what in ("time", "propellant"))
+    assert soon.end < cheap.end
+    assert soon.total_impulse >= cheap.total_impulse * (1 - 1e-9)
+    assert plan(within(0.9 * soon.end), "optimal").schedule is None
+
+
 @pytest.mark.parametrize(("free", "pulses"), [(False, 2), (True, 1)])
 def test_least_pulses_fires_as_seldom_as_the_equations_allow(free: bool, pulses: int) -> None:
     assert len(flies(within(60.0, cross(40.0)), least="pulses", free_axis=free).pulses) == pulses
