@@ -244,7 +244,7 @@ def show_failures(compared: Comparison) -> bool:
             import traceback
 
             say("".join(traceback.format_exception(plan._failure)).rstrip("\n"))
-        say(f"nutdamp: {plan.scheme}: {plan._refusal} (--debug shows the traceback)")
+        say(f"nutdamp: {plan.scheme}: {plan.why} (--debug shows the traceback)")
     return bool(compared.failed)
 
 

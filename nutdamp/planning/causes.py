@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 from nutdamp.common.numerics import RPM
 from nutdamp.common.results import Note, note
+from nutdamp.errors import Infeasible
 from nutdamp.flight.cones import Aspect
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.plan import Plan, Worse
 from nutdamp.planning.verdict import Verdict
 from nutdamp.schemes.correction import steady_omega
 from nutdamp.spacecraft import requirements
@@ -20,27 +21,34 @@ from nutdamp.spacecraft.requirements import NEGLIGIBLE, Part
 from nutdamp.spacecraft.schedule import Schedule
 
 CUT = "the search ended at its limit of work"
+BUG = "internal error, please report"
+"""Message on a plan whose scheme raised an unexpected exception, which follows by name."""
 
 
 def infeasibility(plan: Plan) -> str:
     """Reason for the lack of a schedule; empty where there is one."""
-    if plan._breach is not None:
-        why = f"the only schedule found breaks a limit: {_broken(plan._breach)}"
-    elif plan._astray is not None:
-        why = strays(plan._astray)
-        if math.isfinite(plan._astray.least_at):
-            why += "; no way round it was found within the limits"
-    elif plan._worse is not None:
-        why = f"the best schedule found would leave {math.degrees(plan._worse):.3g}° of nutation"
-        decayed = requirements.decayed(plan.spacecraft, plan._worse_at)
-        if decayed < plan.spacecraft.nutation:
-            why += (
-                f" at {plan._worse_at:.4g} s; without a pulse it decays to "
-                f"{math.degrees(decayed):.3g}° by then"
-            )
-    else:
-        why = plan._refusal or ""
-    return f"{why}; {CUT}" if why and plan._cut else why
+    match plan._why:
+        case None:
+            return ""
+        case Breach() as breach:
+            why = f"the only schedule found breaks a limit: {_broken(breach)}"
+        case Aspect() as aspect:
+            why = strays(aspect)
+            if math.isfinite(aspect.least_at):
+                why += "; no way round it was found within the limits"
+        case Worse(nutation, at):
+            why = f"the best schedule found would leave {math.degrees(nutation):.3g}° of nutation"
+            decayed = requirements.decayed(plan.spacecraft, at)
+            if decayed < plan.spacecraft.nutation:
+                why += (
+                    f" at {at:.4g} s; without a pulse it decays to "
+                    f"{math.degrees(decayed):.3g}° by then"
+                )
+        case Infeasible() as reason:
+            why = str(reason)
+        case failure:
+            why = f"{BUG}: {type(failure).__name__}"
+    return f"{why}; {CUT}" if plan._cut else why
 
 
 def strays(aspect: Aspect) -> str:

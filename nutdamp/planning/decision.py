@@ -198,9 +198,6 @@ def _missed(plan: Plan) -> float:
 
 ROBUST = "robust"  # name of the robust plan beside those of schemes
 
-BUG = "internal error, please report"
-"""Message on a plan whose scheme raised an unexpected exception, which follows by name."""
-
 SEARCH = 100.0
 """Steps of progress of a scheme that searches, and of the dispersed cases, beside one of each
 classic scheme.
@@ -482,5 +479,5 @@ def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Pla
     except NutdampError:
         raise
     except Exception as failure:
-        return Plan(spacecraft, scheme, None, f"{BUG}: {type(failure).__name__}", _failure=failure)
+        return Plan(spacecraft, scheme, None, failure)
     return planned

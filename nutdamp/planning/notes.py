@@ -14,7 +14,7 @@ import numpy as np
 
 from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
-from nutdamp.errors import NutdampError
+from nutdamp.errors import NotFound, NutdampError
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import inertia as principal_moments
 from nutdamp.planning.decision import (
@@ -87,7 +87,7 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
         from nutdamp.planning.causes import infeasibility  # no plan
 
         why = infeasibility(plan)
-        if plan._found_none:
+        if isinstance(plan._why, NotFound):
             return (note("not-found", scheme=plan.scheme, why=why),)
         return (note("infeasible", scheme=plan.scheme, why=why),)
     notes = list(plan.pulses.notes)

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nutdamp import units
 from nutdamp.common import results, work
 from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
-from nutdamp.errors import Infeasible, NotFound
+from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import left_by, left_on_the_way, seen_at
 from nutdamp.flight.propagation import Flight, Residual
@@ -41,30 +41,30 @@ class Standing(Enum):
     MISSES = "misses"  # does not meet it, or, without one, does not damp
 
 
+class Worse(NamedTuple):
+    """``nutation``, rad, that the best schedule would leave ``at`` s: no less than without it."""
+
+    nutation: float
+    at: float
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(results.Data, results.Rows):
     """``schedule`` of a ``scheme`` for a ``spacecraft``, and its judgement; None where infeasible.
 
-    ``options``: those of the scheme that it was planned with. Without a schedule one of these is
-    why, in the words of `nutdamp.planning.causes`: ``_refusal``, ``_breach`` of a limit, a cone
-    that the axis breaks (``_astray``), nutation that gets ``_worse``, rad, at ``_worse_at`` s.
-    ``_failure``: the exception of a bug; ``_from_file``: read, not planned; ``_cut``: its search
-    ended at its budget of `work`.
+    ``options``: those of the scheme that it was planned with. ``_why`` there is no schedule, in the
+    words of `nutdamp.planning.causes`: what the scheme raised, a limit or a cone that is broken, or
+    nutation that gets worse. ``_from_file``: read, not planned; ``_cut``: its search ended at its
+    budget of `work`.
     """
 
     spacecraft: Spacecraft
     scheme: str
     schedule: Schedule | None
-    _refusal: str | None = None
+    _why: Exception | Breach | Aspect | Worse | None = None
     options: catalogue.SchemeOptions = field(default_factory=catalogue.SchemeOptions)
-    _failure: Exception | None = None
-    _breach: Breach | None = None
-    _astray: Aspect | None = None
-    _worse: float | None = None
-    _worse_at: float = 0.0
     _from_file: bool = False
     _cut: bool = False
-    _found_none: bool = False
 
     @property
     def feasible(self) -> bool:
@@ -80,6 +80,12 @@ class Plan(results.Data, results.Rows):
     def why(self) -> str | None:
         """Reason for the lack of a schedule; None where there is one."""
         return None if self.feasible else str(results.view(self, "reason"))
+
+    @property
+    def _failure(self) -> Exception | None:
+        """Unexpected exception of the scheme: a bug."""
+        raised = isinstance(self._why, Exception) and not isinstance(self._why, Infeasible)
+        return self._why if raised else None  # type: ignore[return-value]
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -333,13 +339,13 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
     if not spun and scheme in catalogue.PLANNED and scheme not in catalogue.SPINNING:
         able = " and ".join(spinning(spacecraft))
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
-        return Plan(spacecraft, scheme, None, why)
+        return Plan(spacecraft, scheme, None, Infeasible(why))
     if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
         from nutdamp.flight.cones import at_target  # a target
 
         forbidden = at_target(spacecraft)
         if forbidden is not None:
-            return Plan(spacecraft, scheme, None, _astray=forbidden)
+            return Plan(spacecraft, scheme, None, forbidden)
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     known = as_known(spacecraft, disturbed=chosen.with_disturbances)
     with work.budget(scheme, work.SCHEME) as spent:
@@ -348,16 +354,16 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
             schedule = planner.schedule(scheme, planned_for, chosen)
             result = judged(spacecraft, scheme, schedule, chosen)
         except Infeasible as reason:
-            found_none = isinstance(reason, NotFound)
-            result = Plan(spacecraft, scheme, None, str(reason), _found_none=found_none)
-        if result._astray is not None and (
-            catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
-        ):
-            from nutdamp.schemes import routes  # here, because few plans have a cone in the way
+            result = Plan(spacecraft, scheme, None, reason.with_traceback(None))
+        turns = catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands
+        if spacecraft.keep and turns and not result.feasible:
+            from nutdamp.flight.cones import Aspect  # cones
+            from nutdamp.schemes import routes
 
-            rerouted = routes.schedules(known, scheme, chosen)
-            others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
-            result = next((other for other in others if other.feasible), result)
+            if isinstance(result._why, Aspect):
+                rerouted = routes.schedules(known, scheme, chosen)
+                others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
+                result = next((other for other in others if other.feasible), result)
     return replace(result, options=chosen, _cut=spent.exhausted)
 
 
@@ -403,13 +409,13 @@ def judged(
     left = flown.flown
     breach = next(breaches(spacecraft, schedule), None)
     if breach is not None:
-        return Plan(spacecraft, scheme, None, _breach=breach)
+        return Plan(spacecraft, scheme, None, breach)
     if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
         from nutdamp.flight.cones import broken  # a target
 
         astray = broken(spacecraft, flown._flight)
         if astray is not None:
-            return Plan(spacecraft, scheme, None, _astray=astray)
+            return Plan(spacecraft, scheme, None, astray)
     if scheme in catalogue.PLANNED and left is not None:
         spin = spacecraft.goal.spin
         least = requirements.decayed(spacecraft, flown.end) * (1.0 - ROUNDING)
@@ -417,7 +423,7 @@ def judged(
             spacecraft.spin - spin
         )
         if not respun and left.nutation >= least and left.axis_error >= spacecraft.to_turn:
-            return Plan(spacecraft, scheme, None, _worse=left.nutation, _worse_at=flown.end)
+            return Plan(spacecraft, scheme, None, Worse(left.nutation, flown.end))
     return flown
 
 

@@ -116,8 +116,7 @@ def certificate(plan: Plan) -> Certificate:
         raise BadRequest(f"a certificate needs a plan of {OPTIMAL.name}, not of {plan.scheme}")
     if not plan.feasible or known is None or known.first_order is None:
         raise BadRequest(
-            f"{OPTIMAL.name} has no least cost to prove here: "
-            f"{plan._refusal or 'there is no such plan'}"
+            f"{OPTIMAL.name} has no least cost to prove here: {plan.why or 'there is no such plan'}"
         )
     chosen = planner.settled(OPTIMAL, plan.options, plan.spacecraft)
     modelled = as_known(plan.spacecraft, disturbed=chosen.with_disturbances)

@@ -12,6 +12,7 @@ from typing import Any
 from rich.text import Text
 
 from nutdamp.common.numerics import MISSING, RPM
+from nutdamp.errors import NotFound
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import reasons
 from nutdamp.planning.plan import Plan
@@ -290,7 +291,7 @@ def scheme_word(compared: Comparison, plan: Plan) -> str:
     if not plan.feasible:
         if SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels:
             return "no thrusters"
-        return "not found" if plan._found_none else "infeasible"
+        return "not found" if isinstance(plan._why, NotFound) else "infeasible"
     why = compared.shortcoming(plan)
     if why is not None:
         return SHORTLY.get(why.code) or text(why)

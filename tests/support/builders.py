@@ -13,6 +13,7 @@ import numpy as np
 from support import reference
 
 from nutdamp.common import results
+from nutdamp.errors import Infeasible
 from nutdamp.files.facts import Facts
 from nutdamp.files.yaml import read_tree
 from nutdamp.flight.propagation import Residual
@@ -266,7 +267,7 @@ def recommended(what: str, compared: Comparison) -> str:
     return f"{what}: {noted((*reasons(compared), *comparison_warnings(compared)))}"
 
 
-INFEASIBLE = Plan(spinner(), "infeasible", None, "because")
+INFEASIBLE = Plan(spinner(), "infeasible", None, Infeasible("because"))
 HALF_A_DEGREE = Requirement(nutation=math.radians(0.5))
 BOTH = Requirement(nutation=math.radians(0.5), momentum_shift=math.radians(0.2))
 POINTING = Goal(axis=np.array([math.sin(0.2), 0.0, math.cos(0.2)]))

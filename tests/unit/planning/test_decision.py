@@ -28,6 +28,7 @@ from support.places import case
 import nutdamp
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
+from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import Comparison, Ground, cheapest, compare, recommend, usual
 from nutdamp.planning.notes import Gain, alternatives, comparison_warnings, gains, reasons
 from nutdamp.planning.screening import FlownPlan
@@ -362,7 +363,7 @@ def test_a_scheme_that_cannot_set_the_spin_says_so_and_a_spin_that_stays_takes_n
     compared = compare(body, (*catalogue.CLASSIC, "half-cone"))
     assert {one.feasible for one in compared.plans} == {False}
     check_text(
-        "plan.spin-not-set", "\n".join(sorted({one._refusal or "" for one in compared.plans}))
+        "plan.spin-not-set", "\n".join(sorted({infeasibility(one) for one in compared.plans}))
     )
     assert "optimal" in usual(body)
     assert planning.plan(body, "none").meets_requirement is False

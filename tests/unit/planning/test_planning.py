@@ -30,13 +30,14 @@ from support.golden import check_text
 
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight import end_state
+from nutdamp.flight.cones import Aspect
 from nutdamp.flight.propagation import by_impulses
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import broken_limits, infeasibility
 from nutdamp.planning.decision import compare
 from nutdamp.planning.notes import plan_notes, reasons
-from nutdamp.planning.plan import Plan, plan
+from nutdamp.planning.plan import Plan, Worse, plan
 from nutdamp.schemes import catalogue, routes, two_pulse
 from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits
 from nutdamp.spacecraft.equipment import Channel, Steerable
@@ -139,7 +140,8 @@ def test_a_plan_that_would_not_lower_the_nutation_is_infeasible() -> None:
         for one in body.channels[:2]
     )
     assert (along.feasible, against.feasible) == (False, True)
-    assert (along._worse or 0.0) > body.nutation
+    assert isinstance(along._why, Worse)
+    assert along._why.nutation > body.nutation
 
 
 def weak(least: float = 0.01) -> tuple[Channel, ...]:
@@ -165,8 +167,9 @@ def idle(body: Spacecraft, t: float) -> float:
 def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_says_so() -> None:
     compared = compare(replace(SELF_DAMPING, limits=Limits(horizon=180.0)), ("two-pulse",))
     (made,) = compared.plans
-    assert present(made._worse) < 0.01 * SELF_DAMPING.nutation  # it does damp
-    assert idle(SELF_DAMPING, made._worse_at) < present(made._worse)
+    assert isinstance(made._why, Worse)
+    assert made._why.nutation < 0.01 * SELF_DAMPING.nutation  # it does damp
+    assert idle(SELF_DAMPING, made._why.at) < made._why.nutation
     check_text("plan.worse-than-decay", f"{infeasibility(made)}\n{noted(reasons(compared))}")
     assert math.degrees(idle(SELF_DAMPING, 81.91)) == pytest.approx(
         0.05, rel=1e-3
@@ -521,7 +524,8 @@ def test_a_plan_goes_round_where_the_straight_way_breaks_the_cone(
     free = planning.plan(TURNED, "half-cone")
     track = free.fly(free.end, samples=101).track
     body = watched(track.axis[len(track.t) // 2], math.radians(1.0))
-    assert planning.judged(body, "half-cone", free.pulses, free.options)._astray is not None
+    astray = planning.judged(body, "half-cone", free.pulses, free.options)
+    assert isinstance(astray._why, Aspect)
     routed = planning.plan(body, "half-cone")
     assert routed.feasible
     (aspect,) = routed._aspects

@@ -21,6 +21,7 @@ from support.places import CASES, case
 from support.process import Run
 
 from nutdamp.common import numerics
+from nutdamp.errors import Infeasible
 from nutdamp.figures import overview
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.flight import propagation
@@ -329,7 +330,7 @@ def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
     body = spinner(steerable=Steerable())
     assert final_json(planning.plan(body, "two-pulse")._flight)["momentum"]["azimuth_deg"] is None
     assert target_json(body) is None
-    infeasible = plan_json(planning.Plan(body, "two-pulse", None, "why"))
+    infeasible = plan_json(planning.Plan(body, "two-pulse", None, Infeasible("why")))
     assert (infeasible["final"], infeasible["target"], "aspects" in infeasible) == (
         None,
         None,

@@ -25,6 +25,7 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.common.results import Note, Value, note
+from nutdamp.errors import Infeasible
 from nutdamp.planning import plan as planning
 from nutdamp.planning.causes import infeasibility
 from nutdamp.planning.decision import TIES
@@ -119,7 +120,7 @@ def test_the_parts_that_are_missed_and_by_how_much() -> None:
         requirements.Part.SPIN,
     ]
     assert plan._severity == pytest.approx(1.0 / 0.03)
-    assert planning.Plan(plan.spacecraft, "x", None, "why")._severity == math.inf
+    assert planning.Plan(plan.spacecraft, "x", None, Infeasible("why"))._severity == math.inf
 
 
 def test_with_a_target_the_severity_goes_by_the_distance_from_it() -> None:
