@@ -446,7 +446,7 @@ def _cases(chosen: Plan, results: Results) -> Iterator[Block]:
         yield sheet(budget, "screen")
     yield Prose(caption)
     if budget is not None:
-        yield sheet(dispersion.worst_table(results, 5), "screen")
+        yield sheet(dispersion.worst_cases(results, 5), "screen")
         inspect = f"nutdamp disperse, as here, with {dispersion.again(results)}"
         yield Prose(f"Inspect one: {inspect}")
     for note in dispersion.unused_notes(study.model.inputs.unused):

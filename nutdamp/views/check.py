@@ -28,7 +28,6 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import (
     aspects_json,
     derived_facts,
-    derived_table,
     direction_json,
     spacecraft_json,
 )
@@ -40,6 +39,7 @@ from nutdamp.views.tables import (
     Column,
     DataTable,
     Shared,
+    facts,
     file_columns,
     to_figures,
     values_of,
@@ -291,39 +291,32 @@ def tolerance_table(spacecraft: Spacecraft) -> DataTable:
 
 def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableType:
     """The screen of ``check`` for one valid file."""
-    table = channel_table(spacecraft)
-    tolerances = tolerance_table(spacecraft)
-    counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
-    head = [named(spacecraft, "   ", ("VALID", "bold green"), counted)]
-    more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
-    tables = [table]
-    if verbose:
-        tables += [turn_table(spacecraft), valve_table(spacecraft)]
-        tables += [] if spacecraft.tank is None else [tank_table(spacecraft.tank)]
-        loop = spacecraft.loop
-        tables += [disturbance_table(spacecraft)]
-        tables += [] if loop is None else [margin_table(margins(spacecraft, loop))]
-        tables.append(tolerances)
+    details, tables, notes = check_parts(spacecraft, verbose=verbose)
+    tolerances = len(tolerance_table(spacecraft).rows)
+    counted = f" (channels: {len(spacecraft.channels)}, tolerances: {tolerances})"
     return Summary(
-        [*head, derived_table(spacecraft, more)],
-        lambda first=None: [each.screen("screen", first=first) for each in tables if each.rows],
-        (*warnings(spacecraft), *_notes(spacecraft, verbose=verbose)),
+        [named(spacecraft, "   ", ("VALID", "bold green"), counted), facts(details)],
+        lambda first=None: [each.screen("screen", first=first) for each in tables],
+        notes,
         "nutdamp plan · nutdamp report",
         verbose,
     )
 
 
 def check_parts(
-    spacecraft: Spacecraft,
+    spacecraft: Spacecraft, *, verbose: bool = True
 ) -> tuple[list[tuple[str, str]], list[DataTable], list[Note]]:
-    """Names and values, tables, and notes of the screen with all values."""
-    facts = [*derived_facts(spacecraft), *_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)]
+    """Names and values, tables, and notes of the screen."""
+    notes = ordered([*warnings(spacecraft), *_notes(spacecraft, verbose=verbose)])
+    details = derived_facts(spacecraft)
+    if not verbose:
+        return details, [channel_table(spacecraft)] if spacecraft.channels else [], notes
+    details += [*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)]
     tables = [channel_table(spacecraft), turn_table(spacecraft), valve_table(spacecraft)]
     tables += [] if spacecraft.tank is None else [tank_table(spacecraft.tank)]
     held = () if spacecraft.loop is None else margins(spacecraft, spacecraft.loop)
     tables += [disturbance_table(spacecraft), margin_table(held), tolerance_table(spacecraft)]
-    notes = ordered([*warnings(spacecraft), *_notes(spacecraft, verbose=True)])
-    return facts, [table for table in tables if table.rows], notes
+    return details, [table for table in tables if table.rows], notes
 
 
 def _notes(spacecraft: Spacecraft, *, verbose: bool) -> Iterator[Note]:

@@ -7,7 +7,7 @@ Vectors are in the axes of the file, angles in degrees.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -136,9 +136,9 @@ def opening(spacecraft: Spacecraft, verbose: bool) -> tuple[RenderableType, ...]
     return (title(spacecraft),)
 
 
-def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
-    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
-    return facts([*derived_facts(spacecraft), *more])
+def derived_table(spacecraft: Spacecraft) -> Table:
+    """Derived quantities of the spacecraft at t = 0."""
+    return facts(derived_facts(spacecraft))
 
 
 def derived_facts(spacecraft: Spacecraft) -> list[tuple[str, str]]:

@@ -130,8 +130,7 @@ def dispersion_screen(
         steps = STEP.join(["--plot cases.png", *([f"{again(results)} (worst)"] if varies else [])])
         brief = percentiles.screen("screen")
         return Summary(head, lambda **_: [brief], [*main_causes(judged), *notes], steps)
-    right = "Percentiles are right to 0.006 % of their value; nominal and max are exact."
-    accuracy = [] if results.exact else [Text(right, style="dim")]
+    accuracy = [] if results.exact else [Text(ACCURACY, style="dim")]
     tables: list[RenderableType] = [
         Group(percentiles.screen("full"), *accuracy),
         Group(
@@ -141,7 +140,7 @@ def dispersion_screen(
         Group(*tolerance_budget(results)),
     ]
     if worst and varies:
-        cases = worst_cases(results, worst, _effects(study))
+        cases = worst_cases(results, worst)
         tables.append(inspected(cases, f"nutdamp disperse, as here, with {again(results)}"))
     return Summary(head, lambda: tables, notes, verbose=True)
 
@@ -195,13 +194,13 @@ def counts_json(results: Results | LoopResults) -> dict[str, Any]:
     return counts | values_of(results, "seed=study.seed", "redrawn")
 
 
-def worst_cases(results: Results, count: int, effects: Array | None = None) -> DataTable:
-    """`case_table` of so many cases, the worst first."""
+def worst_cases(results: Results, count: int) -> DataTable:
+    """The worst cases, one row each, with what contributes most."""
     study = results.study
     rows = [
         _flown(study, case, study.draws_of(case)) for case in results.worst.cases[:count].tolist()
     ]
-    return case_table(study, FLOWN_OUTPUTS, rows, effects)
+    return case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
 
 
 def again(results: Results | LoopResults) -> str:
@@ -702,11 +701,3 @@ def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
     pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
     return {"correlation": [list(pair) for pair in pairs]} if pairs else {}
-
-
-def worst_table(results: Results, count: int) -> DataTable:
-    """The worst cases, one row each, with what contributes most."""
-    study = results.study
-    cases = results.worst.cases[:count].tolist()
-    rows = [_flown(study, case, study.draws_of(case)) for case in cases]
-    return case_table(study, FLOWN_OUTPUTS, rows, _effects(study))
