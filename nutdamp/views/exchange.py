@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,19 +14,40 @@ if TYPE_CHECKING:
     from nutdamp.planning.plan import Plan
 
 
+def _plan_json(plan: Plan, _until: float | None) -> str:
+    from nutdamp.files.tabular import json_text
+    from nutdamp.planning.decision import compare_plans
+    from nutdamp.views.decisions import comparison_json
+
+    return json_text(comparison_json(compare_plans((plan,))))
+
+
+def _spin_table(plan: Plan, until: float | None) -> str:
+    from nutdamp.views.simulation import spin_table
+
+    return spin_table(plan.spacecraft, plan.pulses, plan.end if until is None else until)
+
+
+def _basilisk(plan: Plan, _until: float | None) -> str:
+    from nutdamp.files.export import basilisk_script
+
+    return basilisk_script(plan)
+
+
 class Format(NamedTuple):
     """A format: its ``name``, and a ``summary`` for help pages.
 
-    ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``:
-    needs the epoch and the frame of the attitude. ``needs_orbit``: incomplete without one.
-    ``nutates``: as symmetric bodies do.
+    ``text`` of a plan and of the end of a track, s: of formats without dates; the others need the
+    epoch and the frame of the attitude. ``message``: a CCSDS message, in either notation.
+    ``track``: ends when requested. ``needs_orbit``: incomplete without one. ``nutates``: as
+    symmetric bodies do.
     """
 
     name: str
     summary: str
+    text: Callable[[Plan, float | None], str] | None = None
     message: bool = False
     track: bool = False
-    dated: bool = False
     needs_orbit: bool = False
     nutates: bool = False
 
@@ -33,29 +55,16 @@ class Format(NamedTuple):
 FORMATS = {  # formats by name
     row.name: row
     for row in (
-        Format("apm", "state and pulses (CCSDS)", message=True, dated=True),
+        Format("apm", "state and pulses (CCSDS)", message=True),
+        Format("aem", "attitude history (CCSDS) as quaternions", message=True, track=True),
         Format(
-            "aem", "attitude history (CCSDS) as quaternions", message=True, track=True, dated=True
+            "aem-spin", "as spin, nutation and momentum", message=True, track=True, nutates=True
         ),
-        Format(
-            "aem-spin",
-            "as spin, nutation and momentum",
-            message=True,
-            track=True,
-            dated=True,
-            nutates=True,
-        ),
-        Format(
-            "opm",
-            "velocity change of each pulse (CCSDS)",
-            message=True,
-            dated=True,
-            needs_orbit=True,
-        ),
-        Format("stk", "attitude history as .a", track=True, dated=True),
-        Format("spin-table", "CSV, one row a spin", track=True),
-        Format("basilisk", "a script that flies the schedule"),
-        Format("json", "as `plan --json`"),
+        Format("opm", "velocity change of each pulse (CCSDS)", message=True, needs_orbit=True),
+        Format("stk", "attitude history as .a", track=True),
+        Format("spin-table", "CSV, one row a spin", _spin_table, track=True),
+        Format("basilisk", "a script that flies the schedule", _basilisk),
+        Format("json", "as `plan --json`", _plan_json),
     )
 }
 
@@ -82,24 +91,11 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     """
     expect_possible(form, xml=xml, until=until)
     row = FORMATS[form]
-    pulses = plan.pulses
-    if row.dated:
-        return _dated(
-            plan, row, plan.spacecraft.watched_until(pulses.end) if until is None else until, xml
-        )
-    if form == "json":
-        from nutdamp.files.tabular import json_text
-        from nutdamp.planning.decision import compare_plans
-        from nutdamp.views.decisions import comparison_json
-
-        return json_text(comparison_json(compare_plans((plan,))))
-    if form == "spin-table":
-        from nutdamp.views.simulation import spin_table
-
-        return spin_table(plan.spacecraft, pulses, pulses.end if until is None else until)
-    from nutdamp.files.export import basilisk_script
-
-    return basilisk_script(plan)
+    if row.text is not None:
+        return row.text(plan, until)
+    return _dated(
+        plan, row, plan.spacecraft.watched_until(plan.end) if until is None else until, xml
+    )
 
 
 def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
