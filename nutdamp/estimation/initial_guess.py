@@ -32,6 +32,7 @@ from nutdamp.estimation.parameters import (
     RATIO,
     SEEN,
     SPACE,
+    TURN_AT_START,
     Record,
     Values,
     Vector,
@@ -392,7 +393,7 @@ def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     weights = 0.1 / scales_of(model)[model.signal]
     # Of one direction the attitude is not told about it.
     certainty = {
-        each.name: 1.0 / each.prior for each in model.parameters if each.name.startswith("attitude")
+        each.name: 1.0 / each.prior for each in model.parameters if each.kind is TURN_AT_START
     }
     held = np.array([certainty.get(name, 0.0) for name in names])
     matrix = np.concatenate([np.column_stack(columns) * weights[:, None], np.diag(held)])

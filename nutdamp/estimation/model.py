@@ -50,11 +50,6 @@ from nutdamp.spacecraft.schedule import Schedule
 PREDICTION = 0.1  # units of `work` of a prediction, besides steps
 SHOWN = 2e-4  # of each of its samples
 SAMPLE = 1e-3  # of each time of a motion that is new
-OF_SENSORS = (
-    "bias",
-    "misalignment",
-    "wobble",
-)  # first words of parameters that leave the motion as it is
 
 
 class Body(NamedTuple):
@@ -116,6 +111,7 @@ class Model:
             )
         )
         self.prior = prior(spacecraft, self.parameters)
+        self._of_sensors = {each.name for each in self.parameters if each.kind.of_sensor}
         self.pulses = self._pulses()
         kinds = record.kinds
         if not kinds:
@@ -236,9 +232,7 @@ class Model:
 
     def _remembered(self, values: Values) -> tuple[Vector, Vector]:
         """The motion at all times; once for values that differ in what only the sensors are off."""
-        key = tuple(
-            (name, value) for name, value in values.items() if not name.startswith(OF_SENSORS)
-        )
+        key = tuple((name, value) for name, value in values.items() if name not in self._of_sensors)
         if self._last is None or self._last[0] != key:
             times = self._instants
             work.spend(SAMPLE * len(times))

@@ -379,20 +379,68 @@ DELAY = 0.05  # standard deviation of what a channel's thrust is late, s
 TINY = 1e-7  # step of derivatives, rad, or as a share of a value
 
 
+class ParameterKind(NamedTuple):
+    """Kind of the numbers to be estimated, in the SI ``unit``.
+
+    Its ``name`` and its ``label`` have braces for which of several one is. People see it ``factor``
+    times as large in ``shown`` units; without a label not by itself.
+    """
+
+    name: str
+    unit: str
+    label: str = ""
+    shown: str = ""
+    factor: float = 1.0
+    of_body: bool = False  # beside its motion: shown first
+    of_sensor: bool = False  # leaves the motion as it is
+
+
+DEG = math.pi / 180.0
+
+TRANSVERSE_MOMENT = ParameterKind("A", "kg m²")
+MOMENT_RATIO = ParameterKind(RATIO, "")
+BODY_RATE = ParameterKind("omega_{}", "rad/s")
+WHEEL_MOMENTUM = ParameterKind("wheel", "N m s", "wheel momentum h", "N m s", of_body=True)
+GROWTH = ParameterKind("growth", "1/s", "growth 1/τ", "1/s", of_body=True)
+UNEQUAL_MOMENTS = ParameterKind("unequal_1", "", "(I1 - I2)/(I1 + I2)", of_body=True)
+PRODUCT = ParameterKind("unequal_2", "", "I12/A", of_body=True)
+TURN_AT_START = ParameterKind("attitude_{}", "rad", "attitude about {}", "deg", 1.0 / DEG)
+GYRO_BIAS = ParameterKind("bias_{}", "rad/s", "bias of {}", "deg/s", 1.0 / DEG, of_sensor=True)
+ACCELEROMETER_BIAS = ParameterKind(
+    f"bias_{ACCELERATION}", "m/s²", f"bias of {ACCELERATION}", "m/s²", of_sensor=True
+)
+MISALIGNMENT = ParameterKind(
+    "misalignment_{}", "rad", "gyros tilted about {}", "deg", 1.0 / DEG, of_sensor=True
+)
+WOBBLE = ParameterKind("wobble_{}", "rad", "axis tilted about {}", "deg", 1.0 / DEG, of_sensor=True)
+THRUST_FACTOR = ParameterKind("thrust {}", "", "thrust factor of {}")
+LATENESS = ParameterKind("delay {}", "s", "delay of {}", "ms", 1e3)
+
+
 class Parameter(NamedTuple):
     """One number to be estimated."""
 
-    name: str
-    unit: str  # SI
+    kind: ParameterKind
+    which: str  # of several
     file: float  # value by the file
     prior: float  # one sigma of that; infinite where the file says nothing that counts
     step: float  # change for derivatives
 
+    @property
+    def name(self) -> str:
+        """Name in files."""
+        return self.kind.name.format(self.which)
 
-def _pair(name: str, sigma: float) -> Iterator[Parameter]:
+    @property
+    def label(self) -> str:
+        """Name for people."""
+        return self.kind.label.format(self.which)
+
+
+def _pair(kind: ParameterKind, sigma: float) -> Iterator[Parameter]:
     """Two angles, rad, about the axes across axis 3, zero by the file."""
-    for number in (1, 2):
-        yield Parameter(f"{name}_{number}", "rad", 0.0, sigma, TINY)
+    for number in "12":
+        yield Parameter(kind, number, 0.0, sigma, TINY)
 
 
 def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
@@ -406,10 +454,10 @@ def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
     (A, of_A), (C, of_C), together = _of_moments(spacecraft)
     ratio = C / A
     if of_A > 0.0 and of_C > 0.0:
-        yield Parameter("A", "kg m²", A, of_A, TINY * A)
+        yield Parameter(TRANSVERSE_MOMENT, "", A, of_A, TINY * A)
     both = 2.0 * together * of_A / A * of_C / C
     sigma = ratio * math.sqrt((of_A / A) ** 2 + (of_C / C) ** 2 - both)
-    yield Parameter(RATIO, "", ratio, sigma or math.inf, TINY * ratio)
+    yield Parameter(MOMENT_RATIO, "", ratio, sigma or math.inf, TINY * ratio)
 
 
 def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[float, float]:
@@ -479,37 +527,34 @@ def parameters(
         yield from moments(spacecraft)
     if dispersions.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
         wheel, sigma = prior_of(dispersions.wheel_momentum, spacecraft.inertia.wheel)
-        yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))
+        yield Parameter(WHEEL_MOMENTUM, "", wheel, sigma, TINY * abs(wheel))
     for number in (1, 2):
-        yield Parameter(
-            f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, step
-        )
+        rate = float(spacecraft.omega0[number - 1])
+        yield Parameter(BODY_RATE, str(number), rate, math.inf, step)
     if record.shows_spin:
-        yield Parameter("omega_3", "rad/s", spin, math.inf, step)
+        yield Parameter(BODY_RATE, "3", spin, math.inf, step)
     elif dispersions.omega0[2] is not None:
         mean, sigma = prior_of(dispersions.omega0[2], spin)
-        yield Parameter("omega_3", "rad/s", mean, sigma, step)
+        yield Parameter(BODY_RATE, "3", mean, sigma, step)
     if growing and (spacecraft.inertia.a != 0.0 or spacecraft.inertia.wheel != 0.0):
-        yield Parameter(
-            "growth", "1/s", spacecraft.growth, math.inf, 1e-5 / max(record.length, 1e-3)
-        )
+        small = 1e-5 / max(record.length, 1e-3)
+        yield Parameter(GROWTH, "", spacecraft.growth, math.inf, small)
     if any(kind.attitude for kind in record.kinds):
         yield from _attitude(spacecraft, record)
     yield from _gyros(spacecraft, record)
     if any(kind.wobble for kind in record.kinds):
-        yield from _pair("wobble", TILT)
+        yield from _pair(WOBBLE, TILT)
     if record.has(ACCELERATION):
-        yield Parameter(
-            "bias_acceleration", KIND[ACCELERATION].unit, 0.0, math.inf, 1e-6 * spin * spin
-        )
+        yield Parameter(ACCELEROMETER_BIAS, "", 0.0, math.inf, 1e-6 * spin * spin)
     if unequal:
         first, second, _ = spacecraft.inertia.moments
-        yield Parameter("unequal_1", "", (first - second) / (first + second), math.inf, 1e-6)
-        yield Parameter("unequal_2", "", 0.0, math.inf, 1e-6)
+        uneven = (first - second) / (first + second)
+        yield Parameter(UNEQUAL_MOMENTS, "", uneven, math.inf, 1e-6)
+        yield Parameter(PRODUCT, "", 0.0, math.inf, 1e-6)
     for name in dict.fromkeys(pulse.channel for pulse in record.fired):
         mean, sigma = thrust_prior(spacecraft, name)
-        yield Parameter(f"thrust {name}", "", mean, max(sigma, THRUST), TINY)
-        yield Parameter(f"delay {name}", "s", 0.0, DELAY, 1e-6)
+        yield Parameter(THRUST_FACTOR, name, mean, max(sigma, THRUST), TINY)
+        yield Parameter(LATENESS, name, 0.0, DELAY, 1e-6)
 
 
 def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -534,9 +579,9 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
             else 0.0
         )
     if sigma > 0.0:
-        yield from _pair("attitude", sigma)
+        yield from _pair(TURN_AT_START, sigma)
     if record.shows_turn:
-        yield Parameter("attitude_3", "rad", 0.0, math.inf, TINY)
+        yield Parameter(TURN_AT_START, "3", 0.0, math.inf, TINY)
 
 
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -553,9 +598,9 @@ def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
         if record.has(name):
             step = quantisation(record.signals[name])
             free = math.hypot(sigma, step / math.sqrt(12.0)) if aligned else math.inf
-            yield Parameter(f"bias_{name}", "rad/s", mean, free, TINY)
+            yield Parameter(GYRO_BIAS, name, mean, free, TINY)
     if aligned and (record.has(GYROS[0]) or record.has(GYROS[1])):
-        yield from _pair("misalignment", TILT)
+        yield from _pair(MISALIGNMENT, TILT)
 
 
 def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:

@@ -23,14 +23,17 @@ from nutdamp.common.time import MONTH
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.fit import expect_alive, expect_enough, fit, step
-from nutdamp.estimation.model import OF_SENSORS, Body, Model
+from nutdamp.estimation.model import Body, Model
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
+    DEG,
     EXACT,
     GYROS,
     RATIO,
     SEEN,
+    THRUST_FACTOR,
+    TURN_AT_START,
     Matrix,
     Record,
     Values,
@@ -45,8 +48,6 @@ from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 WHEEL = "wheel momentum"  # input of a wheel that is estimated
-
-DEG = math.pi / 180.0
 
 # sources of an estimate: the file's tolerances, both, the data, or the ratio that these tell
 UNTOLD, SHARED, TOLD, BY_RATIO = "file", "both", "data", "ratio"
@@ -150,8 +151,8 @@ def carried(fitted: Fit, time: float) -> Carried:
     channels = {channel.name: channel for channel in model.spacecraft.channels}
     factors: dict[str, str] = {}
     for parameter in model.parameters:
-        kind, _, name = parameter.name.partition(" ")
-        if kind == "thrust" and name in channels:
+        name = parameter.which
+        if parameter.kind is THRUST_FACTOR and name in channels:
             value, sigma = _at(fitted, parameter.name)
             # It fired, and the data tell its thrust better than the file.
             if value > LEAST_THRUST and sigma < thrust_prior(model.spacecraft, name)[1]:
@@ -317,10 +318,11 @@ def _told(fitted: Fit, function: Callable[[Values], Vector]) -> tuple[Vector, Ma
     differences.
     """
     columns: list[Vector] = []
-    for name, _, _, _, size in fitted.model.parameters:
-        if name.startswith(OF_SENSORS):
+    for parameter in fitted.model.parameters:
+        if parameter.kind.of_sensor:
             columns.append(np.zeros_like(columns[0]))  # the motion comes first of the parameters
             continue
+        name, size = parameter.name, parameter.step
         above, below = (
             function(fitted.named | {name: fitted.named[name] + way}) for way in (size, -size)
         )
@@ -330,23 +332,6 @@ def _told(fitted: Fit, function: Callable[[Values], Vector]) -> tuple[Vector, Ma
 
 
 MOTION = ("spin", "nutation", "omega", "phase")  # estimates that differ with the time
-
-LABELS = {
-    "wheel": ("wheel momentum h", "N m s", 1.0),
-    "growth": ("growth 1/τ", "1/s", 1.0),
-    "unequal_1": ("(I1 - I2)/(I1 + I2)", "", 1.0),
-    "unequal_2": ("I12/A", "", 1.0),
-    "bias_acceleration": (f"bias of {ACCELERATION}", "m/s²", 1.0),
-    "bias": ("bias of {}", "deg/s", 1.0 / DEG),
-    "misalignment": ("gyros tilted about {}", "deg", 1.0 / DEG),
-    "wobble": ("axis tilted about {}", "deg", 1.0 / DEG),
-    "attitude": ("attitude about {}", "deg", 1.0 / DEG),
-    "thrust": ("thrust factor of {}", "", 1.0),
-    "delay": ("delay of {}", "ms", 1e3),
-}
-"""Label, unit and factor to it of parameters, by name or by its first word."""
-
-OF_BODY = ("wheel", "growth", "unequal_1", "unequal_2")  # of these, shown first
 
 
 def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
@@ -410,20 +395,17 @@ def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
             factor = 1.0 / DEG if unit.startswith("deg") else 1.0
             by_ratio = key in ("A", "C") and fitted.index("A") is None
             made.append(Estimate(key, label, unit, factor, value, sigma, file, prior, by_ratio))
-    for parameter in sorted(model.parameters, key=lambda each: each.name not in OF_BODY):
-        name = parameter.name
-        kind, _, which = name.partition(" " if " " in name else "_")
-        told = LABELS.get(name) or LABELS.get(kind)
-        prior = thrust_prior(spacecraft, which)[1] if kind == "thrust" else parameter.prior
+    for parameter in sorted(model.parameters, key=lambda each: not each.kind.of_body):
+        name, kind = parameter.name, parameter.kind
+        prior = parameter.prior
+        if kind is THRUST_FACTOR:
+            prior = thrust_prior(spacecraft, parameter.which)[1]
         # An attitude without tolerance is told by the data alone.
-        if told is None or (kind == "attitude" and math.isinf(prior)):
+        if not kind.label or (kind is TURN_AT_START and math.isinf(prior)):
             continue
-        label, unit, factor = told
         known = prior if math.isfinite(prior) else None
-        value, sigma = _at(fitted, name)
-        made.append(
-            Estimate(name, label.format(which), unit, factor, value, sigma, parameter.file, known)
-        )
+        shown_as = parameter.label, kind.shown, kind.factor
+        made.append(Estimate(name, *shown_as, *_at(fitted, name), parameter.file, known))
     return tuple(made)
 
 

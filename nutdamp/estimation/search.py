@@ -184,7 +184,7 @@ def units_of(model: Model) -> Vector:
         "1/s": 0.1 / max(model.record.length, 1e-9),
     }
     sizes = (
-        each.prior if math.isfinite(each.prior) else of_unit.get(each.unit, 1e-2)
+        each.prior if math.isfinite(each.prior) else of_unit.get(each.kind.unit, 1e-2)
         for each in model.parameters
     )
     return np.array(list(sizes))

@@ -17,7 +17,7 @@ import numpy as np
 
 from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
-from nutdamp.estimation.parameters import ACCELERATION
+from nutdamp.estimation.parameters import ACCELEROMETER_BIAS, LATENESS, THRUST_FACTOR
 from nutdamp.estimation.results import (
     DIGITS,
     LATE,
@@ -196,15 +196,6 @@ def _disturbance_edits(tree: Node, spacecraft: Spacecraft, time: float) -> Edits
 
 SEEN = 3.0  # standard deviations from which on a growth of the nutation, or a delay, counts as seen
 
-UNWRITTEN = {
-    "bias": ("bias of {}", "deg/s"),
-    "misalignment": ("tilt of the gyros about {}", "deg"),
-    "wobble": ("tilt of the axis about {}", "deg"),
-}
-"""Estimates of sensors that have no key in the file: the bias of a loop is one for both of its
-gyros.
-"""
-
 
 def fitted_text(fit: Fit, carried: Carried) -> str:
     """The text of the file that the fitted spacecraft was read from, with the estimates.
@@ -229,26 +220,19 @@ def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
         yield note("fit-growth", growth=f"{growth:+.3g} 1/s")
     written = dict(_delays(fit))
     unwritten = []
-    for name, value in large.items():
-        kind, _, channel = name.partition(" ")
-        if kind == "delay" and channel not in written:
-            yield note("fit-delay-not-written", channel=channel, delay_s=value)
-        kind, _, which = name.partition("_")
-        if kind in UNWRITTEN and which != ACCELERATION:
-            what, unit = UNWRITTEN[kind]
-            unwritten.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
+    for parameter, value in zip(fit.model.parameters, fit.values.tolist(), strict=True):
+        kind, which = parameter.kind, parameter.which
+        seen = parameter.name in large
+        if seen and kind is LATENESS and which not in written:
+            yield note("fit-delay-not-written", channel=which, delay_s=value)
+        # The bias of a loop is one for both of its gyros.
+        if seen and kind.of_sensor and kind is not ACCELEROMETER_BIAS:
+            unwritten.append(f"{parameter.label} {kind.factor * value:.3g} {kind.shown}")
+        if kind is THRUST_FACTOR and value <= LEAST_THRUST:
+            code = "fit-no-thrust" if value > -LEAST_THRUST else "fit-thrust-reversed"
+            yield note(code, channel=which, thrust_percent=100.0 * value)
     if unwritten:
         yield note("fit-not-written", estimates=", ".join(unwritten))
-    for parameter, factor in zip(fit.model.parameters, fit.values.tolist(), strict=True):
-        kind, _, channel = parameter.name.partition(" ")
-        if kind == "thrust" and factor <= LEAST_THRUST:
-            silent = factor > -LEAST_THRUST
-            percent = 100.0 * factor
-            yield note(
-                "fit-no-thrust" if silent else "fit-thrust-reversed",
-                channel=channel,
-                thrust_percent=percent,
-            )
     if carried.time != 0.0:
         yield from _limits_anew(spacecraft, carried.time)
     if spacecraft.tank is not None and len(fit.model.record.schedule):
@@ -303,7 +287,7 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
                 yield Edit((*path, key), values[key])
         if own is None:
             yield Edit(path, values)
-    if (bias := large.get(f"bias_{ACCELERATION}")) is not None:
+    if (bias := large.get(ACCELEROMETER_BIAS.name)) is not None:
         yield Edit(("loop", "sensor", "bias"), bias, "acceleration")
     yield from _disturbance_edits(tree, before, carried.time)
     sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))

@@ -10,14 +10,16 @@ from typing import IO, TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import results
-from nutdamp.errors import BadRequest, Infeasible, MissingExtra
+from nutdamp.errors import BadRequest, Infeasible, MissingExtra, NotFound
 from nutdamp.files.tabular import track_array, write_track, write_whole
+from nutdamp.flight.cones import Aspect
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
-from nutdamp.planning.plan import Plan, feasible
+from nutdamp.planning.plan import Plan, Worse, feasible
 from nutdamp.planning.simulation import Simulation
 from nutdamp.planning.verdict import Verdict
+from nutdamp.spacecraft.constraints import Breach
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import comparison_json
 from nutdamp.views.glance import scheme_table
@@ -298,4 +300,14 @@ def former(result: Plan, name: str) -> Any:
     instead = f": {FORMER[name]} has it" if FORMER[name] else ""
     warning = f"{name} of a plan goes with version 0.5{instead}"
     warnings.warn(warning, DeprecationWarning, stacklevel=4)  # of who asks the plan
-    return getattr(result, "notes" if name == "remarks" else f"_{name}")
+    why = result._why
+    gone = {
+        "remarks": result.notes,
+        "refusal": str(why) if isinstance(why, Exception) else None,
+        "breach": why if isinstance(why, Breach) else None,
+        "astray": why if isinstance(why, Aspect) else None,
+        "worse": why.nutation if isinstance(why, Worse) else None,
+        "worse_at": why.at if isinstance(why, Worse) else 0.0,
+        "found_none": isinstance(why, NotFound),
+    }
+    return gone[name] if name in gone else getattr(result, f"_{name}")

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import date, datetime, timedelta, timezone
 from functools import partial
 from html.parser import HTMLParser
@@ -34,6 +35,7 @@ from support.shown import parsed
 
 import nutdamp
 from nutdamp import errors
+from nutdamp.errors import NotFound
 from nutdamp.figures import style
 from nutdamp.files import schedules, tabular
 from nutdamp.files.reader import read_spacecraft
@@ -42,7 +44,7 @@ from nutdamp.montecarlo import study
 from nutdamp.montecarlo.inputs import list_inputs
 from nutdamp.page import report, results
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import plan
+from nutdamp.planning.plan import Worse, plan
 
 TILTED = """
 name: Tilted
@@ -649,6 +651,9 @@ total_impulse end residual flown fly simulate carried to_dict to_csv figure
 """
 
 
+REASONS = ("refusal", "breach", "astray", "worse", "worse_at", "found_none")
+
+
 def test_a_plan_has_few_names_and_the_former_ones_warn(monkeypatch: pytest.MonkeyPatch) -> None:
     pandas = types.ModuleType("pandas")
     pandas.DataFrame = dict  # type: ignore[attr-defined]
@@ -658,8 +663,16 @@ def test_a_plan_has_few_names_and_the_former_ones_warn(monkeypatch: pytest.Monke
     for name, cure in results.FORMER.items():
         with pytest.warns(DeprecationWarning, match=f"^{name} of a plan goes .*{re.escape(cure)}"):
             former = getattr(plan, name)
-        own = getattr(plan, "notes" if name == "remarks" else f"_{name}")
-        assert former is own or repr(former) == repr(own), name
+        if name not in REASONS:
+            own = getattr(plan, "notes" if name == "remarks" else f"_{name}")
+            assert former is own or repr(former) == repr(own), name
+    for why, expected in (
+        (None, (None, None, None, None, 0.0, False)),
+        (NotFound("because"), ("because", None, None, None, 0.0, True)),
+        (Worse(0.1, 2.0), (None, None, None, 0.1, 2.0, False)),
+    ):
+        with pytest.warns(DeprecationWarning, match="of a plan goes"):
+            assert tuple(getattr(replace(plan, _why=why), name) for name in REASONS) == expected
     with pytest.warns(DeprecationWarning, match="to_numpy") as warned:
         assert np.array_equal(plan.to_numpy(), np.asarray(plan))
     assert warned[0].filename == __file__
