@@ -229,8 +229,12 @@ def notes(fit: Fit, carried: Carried) -> Iterator[Note]:
         if seen and kind.of_sensor and kind is not ACCELEROMETER_BIAS:
             unwritten.append(f"{parameter.label} {kind.factor * value:.3g} {kind.shown}")
         if kind is THRUST_FACTOR and value <= LEAST_THRUST:
-            code = "fit-no-thrust" if value > -LEAST_THRUST else "fit-thrust-reversed"
-            yield note(code, channel=which, thrust_percent=100.0 * value)
+            percent = 100.0 * value
+            yield note(
+                "fit-no-thrust" if value > -LEAST_THRUST else "fit-thrust-reversed",
+                channel=which,
+                thrust_percent=percent,
+            )
     if unwritten:
         yield note("fit-not-written", estimates=", ".join(unwritten))
     if carried.time != 0.0:
