@@ -382,8 +382,8 @@ TINY = 1e-7  # step of derivatives, rad, or as a share of a value
 class ParameterKind(NamedTuple):
     """Kind of the numbers to be estimated, in the SI ``unit``.
 
-    Its ``name`` and its ``label`` have braces for which of several one is. People see it ``factor``
-    times as large in ``shown`` units; without a label not by itself.
+    Braces in ``name`` and ``label`` stand for which of several it is. Screens show the value times
+    ``factor`` in the unit ``shown``; kinds without a label have no line of their own.
     """
 
     name: str

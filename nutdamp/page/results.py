@@ -300,10 +300,11 @@ def former(result: Plan, name: str) -> Any:
     instead = f": {FORMER[name]} has it" if FORMER[name] else ""
     warning = f"{name} of a plan goes with version 0.5{instead}"
     warnings.warn(warning, DeprecationWarning, stacklevel=4)  # of who asks the plan
+    if name == "remarks":
+        return result.notes
     why = result._why
     gone = {
-        "remarks": result.notes,
-        "refusal": str(why) if isinstance(why, Exception) else None,
+        "refusal": result.why if isinstance(why, Exception) else None,
         "breach": why if isinstance(why, Breach) else None,
         "astray": why if isinstance(why, Aspect) else None,
         "worse": why.nutation if isinstance(why, Worse) else None,

@@ -84,8 +84,8 @@ class Plan(results.Data, results.Rows):
     @property
     def _failure(self) -> Exception | None:
         """Unexpected exception of the scheme: a bug."""
-        raised = isinstance(self._why, Exception) and not isinstance(self._why, Infeasible)
-        return self._why if raised else None  # type: ignore[return-value]
+        why = self._why
+        return why if isinstance(why, Exception) and not isinstance(why, Infeasible) else None
 
     @property
     def notes(self) -> tuple[str, ...]:
