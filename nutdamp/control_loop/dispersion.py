@@ -29,7 +29,14 @@ from nutdamp.control_loop.simulation import (
 )
 from nutdamp.control_loop.stability import Band, dead_band, expect_in_time, held_by
 from nutdamp.errors import BadRequest
-from nutdamp.montecarlo.cases import DispersedModel, cold_of, rotated, tank_of, triple
+from nutdamp.montecarlo.cases import (
+    DispersedModel,
+    cold_of,
+    rotated,
+    tank_of,
+    tilt_quaternion,
+    triple,
+)
 from nutdamp.montecarlo.inputs import (
     BLOCK,
     BY_VALVE,
@@ -39,7 +46,6 @@ from nutdamp.montecarlo.inputs import (
     some_of,
     with_sensor,
 )
-from nutdamp.montecarlo.propagated import carried
 from nutdamp.montecarlo.statistics import Exact, cases_to_show, correlated_shares
 from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases, by_tolerance
 from nutdamp.physics import attitude
@@ -133,13 +139,9 @@ class LoopModel(DispersedModel):
         ``tilts`` (n, 2) rad.
         """
         spacecraft = self.spacecraft
-        angles = np.hypot(*tilts.T)
-        turns = np.zeros((len(tilts), 4))
-        turns[:, 0], turns[:, 1:3] = (
-            np.cos(0.5 * angles),
-            (0.5 * np.sinc(0.5 * angles / math.pi))[:, None] * tilts,
+        turned = attitude.multiply(
+            spacecraft.initial.quaternion, np.stack(tilt_quaternion(*tilts.T), axis=-1)
         )
-        turned = attitude.multiply(spacecraft.initial.quaternion, turns)
         return attitude.multiply(turned, attitude.from_matrix(spacecraft.inertia.axes.T))
 
     def _channels(
@@ -374,7 +376,7 @@ class LoopStudy(DrawnCases):
         start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
         axes = np.array([case.truth.inertia.axes for case in cases])
         turns = spacecraft.inertia.axes.T @ axes
-        momentum = np.einsum("nij,jn->in", turns, carried(tuple(flown.quaternion), end))
+        momentum = np.einsum("nij,jn->in", turns, attitude.turned(flown.quaternion, end))
         start = triple(np.einsum("nij,jn->in", turns, start))
         tilts = np.array([case.tilt for case in cases]).T
         out = np.empty((len(OUTPUTS), len(cases)))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from nutdamp.common.numerics import gauss_legendre
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
@@ -21,11 +22,6 @@ if TYPE_CHECKING:
     from nutdamp.flight.cones import Aspect
 
 SHARE = 0.1  # tolerance of the impulse sum, as a fraction of a bound of the requirement
-
-LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
-"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its
-mirror image.
-"""
 
 
 def momentum_gained(flown: Flight) -> Vector:
@@ -45,9 +41,7 @@ def _quadrature(begin: float, end: float, rates: Vector) -> tuple[Vector, Vector
     """Times (n,) s from ``begin`` to ``end`` and weights of Gauss and Legendre, on stretches of at
     most half a radian at the largest of ``rates``, rad/s.
     """
-    nodes, weights = np.array(
-        [(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]
-    ).T
+    nodes, weights = gauss_legendre(4)
     count = max(math.ceil(float(rates.max()) * (end - begin) / 0.5), 1)
     half = 0.5 * (end - begin) / count
     middles = begin + half * (2.0 * np.arange(count) + 1.0)

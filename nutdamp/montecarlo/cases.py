@@ -50,15 +50,16 @@ def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
     return first, np.cross(along, first)
 
 
+def tilt_quaternion(first: Any, second: Any) -> tuple[Any, Any, Any, Any]:
+    """Quaternion of the rotation vector (``first``, ``second``, 0), rad, by components."""
+    half = 0.5 * np.hypot(first, second)
+    size = 0.5 * np.sinc(half / math.pi)
+    return np.cos(half), size * first, size * second, 0.0 * half
+
+
 def rotated(vector: ArrayLike, tilt: Any) -> Array:
-    """``vector`` (3, n) turned by the rotation vector (``tilt``, 0), rad, by Rodrigues' formula."""
-    first, second, x, y, z = np.broadcast_arrays(*tilt, *np.asarray(vector))
-    axis, turned = np.array([first, second, np.zeros_like(first)]), np.array([x, y, z])
-    angle = np.hypot(first, second) + TINY
-    cosine, sine = cos_sin(angle)
-    ratio = sine / angle
-    along = (first * x + second * y) * ratio * ratio / (1.0 + cosine)
-    return np.asarray(turned * cosine + np.cross(axis, turned, axis=0) * ratio + axis * along)
+    """``vector`` (3, n) turned by the rotation vector (``tilt``, 0), rad."""
+    return np.array(attitude.turned(tilt_quaternion(*tilt), np.asarray(vector)))
 
 
 def in_axes(matrix: Array, vector: Array) -> Array:

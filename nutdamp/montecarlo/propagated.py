@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import forced, make_dynamics, torques_of
@@ -22,7 +22,7 @@ from nutdamp.montecarlo.cases import (
     rotated,
     watch_over,
 )
-from nutdamp.physics import motion, sky
+from nutdamp.physics import attitude, motion, sky
 from nutdamp.physics.motion import Bodies, MotionStretch, advance
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.triaxial import widest_cones
@@ -53,16 +53,6 @@ class Ends:
     aspects: Array | None = None
     drained: Any = 0.0  # as of `DispersedCases`
     disturbed: Ends | None = None  # when the last disturbance has begun or ended, if later
-
-
-def carried(turn: ArrayLike, vector: ArrayLike) -> Array:
-    """``vector`` (3, n) turned by the quaternion ``turn`` (4, n), which rounding has left a little
-    off unit length.
-    """
-    (w, axis), vector = np.split(np.asarray(turn), [1]), np.asarray(vector)
-    scale = 2.0 / (w * w + np.sum(axis * axis, axis=0))
-    moved = np.cross(axis, vector, axis=0)
-    return np.asarray(vector + scale * (w * moved + np.cross(axis, moved, axis=0)))
 
 
 def fly(
@@ -223,7 +213,7 @@ class RealWidths:
 
         def ends(here: MotionStretch, disturbed: Ends | None) -> Ends:
             momentum = last.momentum(here.rates)
-            after = cases.of_estimate(carried(here.quaternion, momentum))
+            after = cases.of_estimate(np.array(attitude.turned(here.quaternion, momentum)))
             nutation = None
             if not last.symmetric:
                 wheel = last.forcing.wheel

@@ -43,17 +43,20 @@ def product(left: Iterable[Any], right: Iterable[Any]) -> tuple[Any, Any, Any, A
 
 def rotate(quaternion: Array, vector: Array) -> Array:
     """Inertial components of a body vector, (..., 4) and (..., 3) -> (..., 3)."""
+    parts = (quaternion[..., index] for index in range(4))
+    return np.stack(turned(parts, (vector[..., index] for index in range(3))), axis=-1)
+
+
+def turned(quaternion: Iterable[Any], vector: Iterable[Any]) -> tuple[Any, Any, Any]:
+    """`rotate` by components, each a number or an array."""
     # Written out: np.cross takes several times as long for a few vectors.
-    w, x, y, z = (quaternion[..., index] for index in range(4))
-    v1, v2, v3 = (vector[..., index] for index in range(3))
+    w, x, y, z = quaternion
+    v1, v2, v3 = vector
     t1, t2, t3 = 2.0 * (y * v3 - z * v2), 2.0 * (z * v1 - x * v3), 2.0 * (x * v2 - y * v1)
-    return np.stack(
-        [
-            v1 + w * t1 + y * t3 - z * t2,
-            v2 + w * t2 + z * t1 - x * t3,
-            v3 + w * t3 + x * t2 - y * t1,
-        ],
-        axis=-1,
+    return (
+        v1 + w * t1 + y * t3 - z * t2,
+        v2 + w * t2 + z * t1 - x * t3,
+        v3 + w * t3 + x * t2 - y * t1,
     )
 
 
@@ -92,8 +95,8 @@ def from_matrix(rotation: Array) -> Array:
 
 def angle_between(first: Array, second: Array) -> Array:
     """Angle in rad between vectors (..., 3), exact to rounding from 0 to π."""
-    cross = np.linalg.norm(np.cross(first, second), axis=-1)
-    return np.asarray(np.arctan2(cross, np.sum(first * second, axis=-1)), dtype=np.float64)
+    parts = (np.moveaxis(np.asarray(vector), -1, 0) for vector in (first, second))
+    return np.asarray(angle_of_parts(*parts), dtype=np.float64)
 
 
 def angle_of_parts(first: Iterable[Any], second: Iterable[Any]) -> Any:

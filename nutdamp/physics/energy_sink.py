@@ -90,7 +90,7 @@ def course(
     """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and
     ``sine_squared``.
 
-    Numbers, or arrays that broadcast, real or complex (a complex step gives derivatives).
+    Numbers, or arrays that broadcast.
     """
     if np.any(shares[1]):
         return _gyrostat_course(growth * shares[0], growth * shares[1], cosine, sine_squared, time)
@@ -124,10 +124,10 @@ def _gyrostat_course(
     from the angle at rest, if there is one.
     """
     # Seen from the end of axis 3 at which the rate is the larger, so that nothing cancels.
-    end = np.where(np.real(slope * level) < 0.0, -1.0, 1.0)
+    end = np.where(slope * level < 0.0, -1.0, 1.0)
     cosine, level = end * cosine, end * level
-    small = 0.5 * sine_squared / (1.0 + np.where(np.real(cosine) > 0.0, cosine, -cosine))
-    above = np.real(cosine) > 0.0
+    small = 0.5 * sine_squared / (1.0 + np.abs(cosine))
+    above = cosine > 0.0
     near, far = np.where(above, 1.0 - small, small), np.where(above, small, 1.0 - small)
     # z' at θ = 0 and at θ = 180°
     first = level + slope
@@ -140,7 +140,7 @@ def _gyrostat_course(
         squared = np.exp(double)
         gained = 2.0 * way * np.expm1(double) / double
         change = last * far * gained + TINY
-        falls = np.real(change) < -0.5
+        falls = change < -0.5
         ratio = np.where(falls, (first * near + last * far * squared) / begin, 1.0 + change)
         lag = far * gained * np.where(falls, np.log(ratio), np.log1p(change)) / change
         return (begin * way + slope * lag) / first, ratio / (near + far * squared), squared, lag
@@ -149,23 +149,21 @@ def _gyrostat_course(
         all="ignore"
     ):  # where a logarithm is of nothing there is no such angle, or it is reached
         rest = 0.5 * np.log(-first * near / (last * far))
-        rest = np.where(np.isfinite(rest) & (np.real(first * last) < 0.0), rest, 1.0 / STILL)
-        most = np.sign(np.real(time)) * FOR_EVER / (np.abs(begin) + 1e-20 * np.abs(first))
+        rest = np.where(np.isfinite(rest) & (first * last < 0.0), rest, 1.0 / STILL)
+        most = np.sign(time) * FOR_EVER / (np.abs(begin) + 1e-20 * np.abs(first))
         over, moves, _, _ = clock(most)
-        until = np.where((np.real(moves) > 0.0) & (np.abs(over) < np.abs(time)), over, time)
+        until = np.where((moves > 0.0) & (np.abs(over) < np.abs(time)), over, time)
         way = 0.0 * (begin * until)
         for _ in range(STEPS):
             passed, moves, _, _ = clock(way)
             gap = rest - begin * way
-            going = (np.real(moves) > 0.0) & (np.abs(gap) > STILL)
+            going = (moves > 0.0) & (np.abs(gap) > STILL)
             late = np.where(going, until - passed, 0.0)
             turned = begin * moves * late / np.where(going, gap, 1.0) + TINY
-            shorter = np.where(
-                np.abs(turned) > MOST_TURNED, np.copysign(MOST_TURNED, np.real(turned)), turned
-            )
+            shorter = np.clip(turned, -MOST_TURNED, MOST_TURNED)
             step = -moves * late * np.expm1(-shorter) / turned
             farthest = 1.01 * np.abs(first * late / (begin + TINY))
-            step = np.where(np.abs(step) > farthest, np.copysign(farthest, np.real(step)), step)
+            step = np.clip(step, -farthest, farthest)
             before = way
             way = np.clip(way + step, -np.abs(most), np.abs(most))
             if np.all(np.abs(way - before) <= CLOSE * np.abs(way)):

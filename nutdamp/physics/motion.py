@@ -407,8 +407,8 @@ def arc(
     R(t) = R(0) Rot(H(0)/A t) Rot3(νt), H in body axes: a frame turns about H at |H|/A, and the body
     in it about its own axis at ν = ω3 - H3/A (Poinsot's rolling cones, Magnus 1970 fig. 4). Without
     dissipation the rates stay in that frame; with it they and the frame slip as in `energy_sink`.
-    Numbers, or arrays that broadcast, real or complex (a complex step gives derivatives); at a
-    ``time`` that is a float, plain numbers, a tenth of the cost of arrays.
+    Numbers, or arrays that broadcast; at a ``time`` that is a float, plain numbers, a tenth of the
+    cost of arrays.
     """
     _, growth, wheel, sense, _ = forcing
     number = isinstance(time, float)

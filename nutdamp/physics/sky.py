@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.attitude import angle_of_parts, rotate
+from nutdamp.physics.attitude import angle_of_parts, rotate, turned
 from nutdamp.physics.energy_sink import damper
 from nutdamp.physics.motion import MotionStretch, advance, between_edges, pieces
 
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 ROWS = 24  # steps per turn of the axis, where it is followed in steps
 
 CIRCLE = 2.0 * math.pi
+
+AXIS = 0.0, 0.0, 1.0  # the third body axis
 
 BACK = np.array([[1.0], [-1.0], [-1.0], [-1.0]])  # factors of the inverse turn
 
@@ -103,8 +105,8 @@ class AxisWatch:
 
     def _arc(self, here: MotionStretch, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
-        momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
-        axis = self.sense * _third_axis(here.quaternion)
+        momentum = np.array(turned(here.quaternion, here.bodies.momentum(here.rates)))
+        axis = self.sense * np.array(turned(here.quaternion, AXIS))
         size = np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum = momentum / size
         way = size / here.bodies.moments[0] * duration
@@ -112,7 +114,7 @@ class AxisWatch:
         for number, direction in enumerate(self._towards(momentum)):
             begins, beta = angle_of_parts(axis, direction), angle_of_parts(momentum, direction)
             along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
-            ahead = np.sum(_cross(momentum, axis) * direction, axis=0)
+            ahead = np.sum(np.cross(momentum, axis, axis=0) * direction, axis=0)
             nearest = (
                 np.arctan2(ahead, along) % CIRCLE
             )  # how far round from where it is the axis comes nearest
@@ -131,10 +133,10 @@ class AxisWatch:
         """
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
-        momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
+        momentum = np.array(turned(here.quaternion, here.bodies.momentum(here.rates)))
         momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
         before, after = (
-            angle_of_parts(momentum, self.sense * _third_axis(stretch.quaternion))
+            angle_of_parts(momentum, self.sense * np.array(turned(stretch.quaternion, AXIS)))
             for stretch in (here, last)
         )
         betas = np.array(
@@ -217,7 +219,7 @@ class AxisWatch:
                 momentum = here.bodies.momentum(here.rates)
                 yield momentum / np.sqrt(np.sum(momentum * momentum, axis=0))
             else:
-                yield _rotated(back, directions[:, cases])
+                yield np.array(turned(back, directions[:, cases]))
 
     def _towards(self, momentum: Array) -> Iterator[Array]:
         """Directions (3, n) of the observed cases, whose H is along the unit vectors ``momentum``
@@ -255,26 +257,6 @@ def _torque(here: MotionStretch) -> Array:
 def _momentum(here: MotionStretch) -> Array:
     """Size (n,) of H, N m s."""
     return np.asarray(np.sqrt(np.sum(here.bodies.momentum(here.rates) ** 2, axis=0)))
-
-
-def _cross(first: Array, second: Array) -> Array:
-    """Cross products of vectors (3, n)."""
-    a, b, c = first
-    x, y, z = second
-    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
-
-
-def _rotated(quaternion: Array, vector: Array) -> Array:
-    """Vectors (3, n) rotated by unit quaternions (4, n)."""
-    w, axis = quaternion[0], quaternion[1:]
-    once = _cross(axis, vector)
-    return np.asarray(vector + 2.0 * (w * once + _cross(axis, once)))
-
-
-def _third_axis(quaternion: Array) -> Array:
-    """Axis 3 of bodies (3, n), inertial, by their unit quaternions (4, n)."""
-    w, x, y, z = quaternion
-    return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
 HALF = 1.01 * math.pi  # rad: a Sun pulse farther off than half a turn is lost
@@ -425,7 +407,7 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        axis = _third_axis(here.quaternion)
+        axis = np.array(turned(here.quaternion, AXIS))
         if len(self.sun) > 3:
             axis = rotate(here.quaternion.T, self.sun[9:].T).T
         return np.asarray(angle_of_parts(self.sense * axis, self.sun[:3]))
@@ -558,7 +540,7 @@ def ahead(
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial; the others are those of a
     `SunPulseClock`, ``sun`` (3, n) or with the mount below it (12, n).
     """
-    s1, s2, s3 = _rotated(quaternion * BACK, sun[:3])  # as the body sees it
+    s1, s2, s3 = turned(quaternion * BACK, sun[:3])  # as the body sees it
     first, second, third = rates
     if len(sun) > 3:
         mount = sun[3:].reshape(3, 3, -1)

@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import TINY, gauss_legendre
 
-SMALL = 1e-9  # relative pressure step for the slope of a table
-
 
 def possible(tank: Tank) -> Any:
     """True if the tank is possible: one value, or by case."""
@@ -105,7 +103,7 @@ class Tank:
         grown = 1.0 + full * np.minimum(used, self.propellant) / self.propellant
         level = grown ** (-self.exponent)
         rise = power * full * flow * level * time / (grown * self.propellant)
-        still = rise == 0.0  # complex too: ((1 + rise)^(1/power) - 1) power/rise, 1 at 0
+        still = rise == 0.0  # ((1 + rise)^(1/power) - 1) power/rise, 1 at 0
         safe = np.where(still, 1.0, rise)
         share = np.where(still, 1.0, np.expm1(np.log1p(safe) / power) * power / safe)[()]
         return flow * level * time * share, level * share
@@ -139,10 +137,9 @@ class Tank:
         """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the
         propellant lasts.
         """
-        left = self.propellant - used
-        lasts = np.real(more) <= np.maximum(np.real(left), 0.0)
-        rest = np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more)
-        return np.where(lasts, 1.0, rest)[()]
+        left = np.maximum(self.propellant - used, 0.0)
+        lasts = more <= left
+        return np.where(lasts, 1.0, left / np.where(lasts, 1.0, more))[()]
 
     def isp_after(self, used: Any) -> Any:
         """Specific impulse, s; None where the thrusters have their own."""
@@ -151,11 +148,7 @@ class Tank:
     def _isp_at(self, pressure: Any) -> Any:
         """Specific impulse of the table, s."""
         pressures, values = zip(*self.isp or (), strict=True)
-        isp = np.interp(np.real(pressure), pressures, values)
-        if not np.iscomplexobj(pressure):
-            return isp
-        rising = np.interp(np.real(pressure) * (1.0 + SMALL), pressures, values) - isp
-        return isp + 1j * np.imag(pressure) * rising / (SMALL * np.real(pressure))
+        return np.interp(pressure, pressures, values)
 
 
 Array = NDArray[np.float64]
@@ -305,11 +298,8 @@ class Trapezoid:
             self.fall_time + fall_time,
         )
         held = command + self.close_delay + close_delay - opens
-        held = np.where(np.real(held) > 0.0, held, 0.0)
-        level = np.where(
-            np.real(held) < np.real(rise), held / np.where(rise == 0.0, 1.0, rise), 1.0
-        )
-        level = np.where(held == 0.0, 0.0, level)
+        held = np.maximum(held, 0.0)
+        level = np.where(held < rise, held / np.where(rise == 0.0, 1.0, rise), held > 0.0)
         return Opened(
             (opens, opens + level * rise, opens + held, opens + held + level * fall), level
         )
@@ -402,8 +392,7 @@ class Measured:
         large, elementwise.
         """
         effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
-        begin = centroid - 0.5 * effective * factor
-        begin = np.where(np.real(begin) > 0.0, begin, 0.0)
+        begin = np.maximum(centroid - 0.5 * effective * factor, 0.0)
         end = begin + effective * factor
         return Opened((begin, begin, end, end), 1.0)
 
