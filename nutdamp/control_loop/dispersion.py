@@ -53,7 +53,7 @@ from nutdamp.planning.verdict import Verdict, cases_of, judge_loop
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
-from nutdamp.spacecraft.requirements import Bound, Held, Left, Part
+from nutdamp.spacecraft.requirements import Bound, Held
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import expect_dispersions
 
@@ -282,6 +282,7 @@ class LoopStudy(DrawnCases):
     """
 
     model: LoopModel
+    outputs = OUTPUTS
 
     def __init__(self, spacecraft: Spacecraft, loop: Loop, until: float, seed: int) -> None:
         self.spacecraft, self.until, self.seed, self.law = (
@@ -306,21 +307,21 @@ class LoopStudy(DrawnCases):
         return self.model.loops(self.draws_of(number), np.array([number]), self.seed)[0]
 
     @cached_property
-    def nominal_measured(self) -> tuple[Array, Left, Array]:
-        """`measured` of the file itself, with the noise of the seed."""
-        return self.measured(self._nominal_flown)
-
-    @property
     def nominal(self) -> Array:
-        """Outputs (8,) of the file itself, with the noise of the seed."""
-        return np.asarray(self.nominal_measured[0][:, 0])
+        """Values (rows,) of the file itself, with the noise of the seed."""
+        return np.asarray(self.measured(self._nominal_flown)[0][:, 0])
 
     @property
-    def nominal_aspects(self) -> Array:
+    def nominal_lost(self) -> bool:
+        """True if the loop of the file fails whatever it leaves, see `Pilot`."""
+        return self._nominal_flown.pilots[0].lost
+
+    @property
+    def nominal_aspects(self) -> Any:
         """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone, of
         that flight.
         """
-        return self._nominal_flown.aspects[:, :, 0]
+        return self.left(self.nominal).angles
 
     @cached_property
     def _nominal_flown(self) -> FlownLoops:
@@ -367,10 +368,8 @@ class LoopStudy(DrawnCases):
             return fly_alone(self.law, cases, self.until, watch)
         return Fleet(self.law, cases, self.until).fly(watch)
 
-    def measured(self, flown: FlownLoops) -> tuple[Array, Left, Array]:
-        """Outputs (8, n) of loops, their residuals, and their severity (n,): infinite where a loop
-        is `lost`.
-        """
+    def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
+        """Values (rows, n) of loops, and their severity (n,): infinite where a loop is `lost`."""
         cases, pilots, spacecraft = flown.cases, flown.pilots, self.spacecraft
         before = np.array([case.truth.omega0 for case in cases]).T
         start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
@@ -390,14 +389,13 @@ class LoopStudy(DrawnCases):
         used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]
         out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
-        aim = out[3] if spacecraft.goal.axis is None else out[4]
-        residuals = Left(out[2], aim, flown.rates[2], flown.aspects if spacecraft.keep else None)
+        rows = [out, flown.aspects.reshape(-1, len(cases))]
+        if spacecraft.goal.spin is not None:
+            rows.append(np.abs(flown.rates[2:] - spacecraft.goal.spin))
+        values = np.concatenate(rows)
         lost = np.array([pilot.lost for pilot in pilots])
-        return (
-            out,
-            residuals,
-            np.where(lost, math.inf, requirements.severity(spacecraft, residuals)),
-        )
+        severity = requirements.severity(spacecraft, self.left(values))
+        return values, np.where(lost, math.inf, severity)
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
@@ -416,9 +414,8 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
 class LoopResults(Counted):
     """Results of a study of a loop; cases that comply settle too.
 
-    ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end, or were
-    stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad: least
-    and largest to the direction of each cone.
+    ``values`` (rows, requested) as of `DrawnCases`, ``lost`` (done,) the cases that see no end, or
+    were stopped; ``stops`` is why loops were flown no further.
     """
 
     study: LoopStudy
@@ -427,9 +424,8 @@ class LoopResults(Counted):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.bounds = tuple(map(self.study.held_by, self.bounds))
-        self.values = np.empty((len(OUTPUTS), self.requested))
-        self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
-        self.lost, self.spin = np.zeros(0, dtype=bool), np.empty(self.requested)
+        self.values = np.empty((self.study.rows, self.requested))
+        self.lost = np.zeros(0, dtype=bool)
 
     def of(self, output: str) -> Array:
         """Known values of an output, (m,)."""
@@ -460,21 +456,17 @@ class LoopResults(Counted):
         """Distribution of the value of a bound's part, of the cases that settle; None where none
         does.
         """
-        return None if self.lost.all() else Exact(self._values(bound)[~self.lost])
+        if self.lost.all():
+            return None
+        return Exact(self.values[self.study.row_of(bound), : self.done][~self.lost])
 
-    def take(
-        self, values: Array, residuals: Left, severity: Array, angles: Array, stops: list[Ending]
-    ) -> None:
-        """Count further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown
-        no further.
-        """
-        rows = slice(self.done, self.done + values.shape[1])
-        self.values[:, rows], self.angles[:, :, rows] = values, angles
-        goal = self.study.spacecraft.goal.spin
-        self.spin[rows] = math.nan if goal is None else abs(residuals.spin - goal)
+    def take(self, values: Array, severity: Array, stops: list[Ending]) -> None:
+        """Count further cases: `LoopStudy.measured`, and why they were flown no further."""
+        self.values[:, self.done : self.done + len(severity)] = values
         self.stops.update(stops)
-        self.lost = np.concatenate([self.lost, np.isinf(severity)])
-        self.count(severity, residuals, ~np.isinf(severity))
+        lost = np.isinf(severity)
+        self.lost = np.concatenate([self.lost, lost])
+        self.count(severity, values, ~lost)
 
     def shares(self, output: str) -> dict[str, float]:
         """Share of each input in the variance of an output over the cases that settle: its squared
@@ -483,9 +475,10 @@ class LoopResults(Counted):
         What chance adds to that over few cases is taken off; empty where they are too few, or
         nothing varies. Of inputs that are correlated each has what it adds to those before it.
         """
-        return self._shares(self.values[OUTPUTS.index(output), : self.done])
+        return self._shares(OUTPUTS.index(output))
 
-    def _shares(self, values: Array) -> dict[str, float]:
+    def _shares(self, row: int) -> dict[str, float]:
+        values = self.values[row, : self.done]
         rows = np.flatnonzero(~self.lost & ~np.isnan(values))
         model = self.study.model
         if len(rows) < FEW:
@@ -504,16 +497,8 @@ class LoopResults(Counted):
         that settle.
         """
         model = self.study.model
-        return by_tolerance(model.inputs.drawn, model.groups, self._shares(self._values(bound)))
-
-    def _values(self, bound: Bound) -> Array:
-        """Values of a bound's part, (done,)."""
-        if bound.keep is not None:
-            angles = self.angles[self.study.spacecraft.keep.index(bound.keep)]
-            return np.asarray(angles[0 if bound.inner else 1, : self.done])
-        if bound.part is Part.SPIN:
-            return self.spin[: self.done]
-        return self.values[OUTPUTS.index(bound.part.value), : self.done]
+        shares = self._shares(self.study.row_of(bound))
+        return by_tolerance(model.inputs.drawn, model.groups, shares)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -528,19 +513,11 @@ class LoopDispersion(Dispersed):
         and by nominal values with the noise of the seed.
         """
         study, spacecraft = self.core.study, self.core.study.spacecraft
-        cases, (_, residuals, severity) = cases_of(self.core), study.nominal_measured
-        nutation, aim, spin = (
-            float(np.ravel(part)[0]) for part in (residuals.nutation, residuals.aim, residuals.spin)
-        )
-        alone = Left(
-            nutation, aim, spin, None if residuals.angles is None else residuals.angles[:, :, 0]
-        )
-        lost = math.isinf(severity[0])
         held = [
             Held(study.held_by(line.bound), line.left)
-            for line in requirements.held(spacecraft, alone)
+            for line in requirements.held(spacecraft, study.left(study.nominal))
         ]
-        return judge_loop(spacecraft, held, cases, self.core, lost=lost)
+        return judge_loop(spacecraft, held, cases_of(self.core), self.core, lost=study.nominal_lost)
 
 
 def run(
@@ -548,13 +525,13 @@ def run(
     *,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
-    collect: Callable[[int, Array, list[Ending], Array], None] | None = None,
+    collect: Callable[[int, Array, list[Ending]], None] | None = None,
 ) -> LoopResults:
     """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
 
     ``watch`` is called with how many are done, ``collect`` with the portions in order: number (from
-    0) of the first case, outputs (8, n), why they end, and angles (m, 2, n) rad. Where ``stopped``,
-    the portions done are kept.
+    0) of the first case, values (rows, n), and why they end. Where ``stopped``, the portions done
+    are kept.
     """
     study = results.study
     source = study.source()
@@ -573,11 +550,11 @@ def run(
             flown = study.fly(cases, partial(_seen, watch, stopped, first))
         except _Interrupted:
             break
-        values, residuals, severity = study.measured(flown)
+        values, severity = study.measured(flown)
         stops = [pilot.ending[0] for pilot in flown.pilots]
-        results.take(values, residuals, severity, flown.aspects, stops)
+        results.take(values, severity, stops)
         if collect is not None:
-            collect(first, values, stops, flown.aspects)
+            collect(first, values, stops)
         watch(results.done)
     return results
 

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,10 +108,41 @@ def threads_here() -> int:
 class DrawnCases:
     """Cases of a ``model`` drawn from a ``seed``. They count from 0 here; people see them count
     from 1.
+
+    The values of a case, of a schedule or of a loop, are a row each: the ``outputs``, the least and
+    the largest angle to each cone (rad), and the error of a spin required (rad/s).
     """
 
     model: Any
     seed: int
+    outputs: ClassVar[tuple[str, ...]]
+
+    @property
+    def rows(self) -> int:
+        """Number of values of a case."""
+        spacecraft: Spacecraft = self.model.spacecraft
+        return len(self.outputs) + 2 * len(spacecraft.keep) + (spacecraft.goal.spin is not None)
+
+    def row_of(self, bound: Bound) -> int:
+        """Row of the value of a bound's part."""
+        if bound.keep is not None:
+            place: int = self.model.spacecraft.keep.index(bound.keep)
+            return len(self.outputs) + 2 * place + (not bound.inner)
+        return self.rows - 1 if bound.part is Part.SPIN else self.outputs.index(bound.part.value)
+
+    def left(self, values: Array) -> Left:
+        """Residual of cases by their values, (rows,) or (rows, n); the spin is as far off the goal,
+        above it.
+        """
+        spacecraft = self.model.spacecraft
+        nutation, aim = (
+            values[self.outputs.index(part.value)]
+            for part in (Part.NUTATION, requirements.aim(spacecraft))
+        )
+        first, cones = len(self.outputs), len(spacecraft.keep)
+        angles = values[first : first + 2 * cones].reshape(cones, 2, *values.shape[1:])
+        spin = math.nan if spacecraft.goal.spin is None else spacecraft.goal.spin + values[-1]
+        return Left(nutation, aim, spin, angles if cones else None)
 
     def source(self) -> DrawSource:
         """Draws for one thread."""
@@ -151,6 +182,7 @@ class Study(DrawnCases):
 
     model: DispersedModel
     seed: int = 1
+    outputs = OUTPUTS
 
     @cached_property
     def flies(self) -> RealWidths:
@@ -179,11 +211,15 @@ class Study(DrawnCases):
         )
 
     def values(self, ends: Ends, count: int) -> Array:
-        """Rows of `Results.values` of ``count`` cases: `OUTPUTS`, angles to the cones, error of a
-        spin required.
+        """Values (rows, n) of ``count`` cases, of angles at the end the larger ones of those as the
+        last pulse ends and after the last disturbance.
         """
         spacecraft = self.model.spacecraft
-        rows = [self._judged(ends, count)]
+        outputs = measure(self.model, ends, count)
+        if ends.disturbed is not None:
+            after = measure(self.model, ends.disturbed, count)[:ANGLES]
+            outputs[:ANGLES] = np.maximum(outputs[:ANGLES], after)
+        rows = [outputs]
         if ends.aspects is not None:
             rows.append(
                 np.broadcast_to(ends.aspects, (*ends.aspects.shape[:2], count)).reshape(-1, count)
@@ -194,30 +230,9 @@ class Study(DrawnCases):
             rows.append(np.broadcast_to(off, (1, count)))
         return np.concatenate(rows)
 
-    def _judged(self, ends: Ends, count: int) -> Array:
-        """`OUTPUTS` of cases, of angles the larger ones of those as the last pulse ends and after
-        the last disturbance.
-        """
-        outputs = measure(self.model, ends, count)
-        if ends.disturbed is not None:
-            after = measure(self.model, ends.disturbed, count)[:ANGLES]
-            outputs[:ANGLES] = np.maximum(outputs[:ANGLES], after)
-        return outputs
-
-    def left(self, values: Array) -> Left:
-        """Residual of cases by their `values`, whose spin is as far off the goal, above it."""
-        spacecraft = self.model.spacecraft
-        aim = OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
-        cones = len(spacecraft.keep)
-        angles = (
-            values[len(OUTPUTS) : len(OUTPUTS) + 2 * cones].reshape(cones, 2, -1) if cones else None
-        )
-        spin = math.nan if spacecraft.goal.spin is None else spacecraft.goal.spin + values[-1]
-        return Left(values[0], values[aim], spin, angles)
-
     def outputs_of(self, draws: Draws) -> Array:
-        """Outputs (5,) of one case with these deviations; none: of the estimate itself."""
-        return self._judged(self.ends_of(draws), 1)[:, 0]
+        """Values (rows,) of one case with these deviations; none: of the estimate itself."""
+        return self.values(self.ends_of(draws), 1)[:, 0]
 
     @property
     def nominal(self) -> Flight:
@@ -293,11 +308,11 @@ class Counted(ABC):
             np.tile([math.pi, 0.0], (len(spacecraft.keep), 1)),
         )
 
-    def count(self, severity: Array, residuals: Left, able: NDArray[np.bool_]) -> None:
-        """Count cases from ``done`` on: their `Study.severity` (n,), residual, and who may comply
+    def count(self, severity: Array, values: Array, able: NDArray[np.bool_]) -> None:
+        """Count cases from ``done`` on: their severity (n,), values (rows, n), and who may comply
         at all.
         """
-        spacecraft = self.study.model.spacecraft
+        spacecraft, residuals = self.study.model.spacecraft, self.study.left(values)
         complies = able.copy()
         astray = np.zeros((len(spacecraft.keep), len(severity)), dtype=bool)
         for row, bound in enumerate(self.bounds):
@@ -375,9 +390,7 @@ class Results(Counted):
     early: Array = field(
         default_factory=lambda: np.zeros((ROWS, EARLY))
     )  # `vectors` of the first cases
-    values: Array | None = field(
-        init=False
-    )  # outputs, least and largest angle (rad) to each of m cones: (5 + 2m, n)
+    values: Array | None = field(init=False)  # of each case, (rows, n)
     sketches: list[Sketch] = field(
         init=False
     )  # of the outputs, beyond `EXACT_CASES`, in place of ``values``
@@ -385,14 +398,9 @@ class Results(Counted):
     def __post_init__(self) -> None:
         super().__post_init__()
         exact = self.requested <= EXACT_CASES
-        self.values = np.empty((self.rows, self.requested)) if exact else None
-        self.sketches = [] if exact else [Sketch() for _ in range(self.rows)]
-
-    @property
-    def rows(self) -> int:
-        """Rows of ``values``: see `Study.values`."""
-        spacecraft = self.study.model.spacecraft
-        return len(OUTPUTS) + 2 * len(spacecraft.keep) + (spacecraft.goal.spin is not None)
+        rows = self.study.rows
+        self.values = np.empty((rows, self.requested)) if exact else None
+        self.sketches = [] if exact else [Sketch() for _ in range(rows)]
 
     @property
     def exact(self) -> bool:
@@ -405,10 +413,7 @@ class Results(Counted):
 
     def spread(self, bound: Bound) -> Distribution | None:
         """Distribution of the value of a bound's part."""
-        if bound.keep is not None:
-            place = self.study.model.spacecraft.keep.index(bound.keep)
-            return self.spread_of(len(OUTPUTS) + 2 * place + (not bound.inner))
-        return self.spread_of(-1 if bound.part is Part.SPIN else OUTPUTS.index(bound.part.value))
+        return self.spread_of(self.study.row_of(bound))
 
     def spread_of(self, row: int) -> Distribution | None:
         """Distribution of a row of `Study.values`; None where it is unknown."""
@@ -469,7 +474,7 @@ class Results(Counted):
             self.values[:, rows] = values
         for sketch, row in zip(self.sketches, values, strict=False):
             sketch.add(row)
-        self.count(severity, self.study.left(values), ~emptied)
+        self.count(severity, values, ~emptied)
 
     def extended(self, requested: int) -> Results:
         """Copy with room for ``requested`` cases: no fewer than are done, and no more than

@@ -220,11 +220,11 @@ def percentile_table(
     sizes: bool = True,
 ) -> DataTable:
     """One row an output: values by shares of the cases, with ``sizes`` those of signed ones, to the
-    digits of the largest; ``alone``: nominal ones with digits of their own, as other places show
-    them.
+    digits of the largest; ``alone``: the ``nominal`` values of a case with digits of their own, as
+    other places show them.
     """
     rows = []
-    for output, value in zip(outputs, nominal.tolist(), strict=True):
+    for output, value in zip(outputs, nominal[: len(outputs)].tolist(), strict=True):
         distribution = results.distribution(output.name)
         values = {"nominal": value}
         if distribution is not None:
@@ -333,14 +333,13 @@ def cones_json(results: Results | LoopResults) -> dict[str, Any]:
 
 
 class CaseRow(NamedTuple):
-    """A case, from 0, or `ESTIMATE`: deviations of its inputs, outputs, angles (m, 2) rad to cones,
-    ending of a loop.
+    """A case, from 0, or `ESTIMATE`: deviations of its inputs, its values as of `DrawnCases`, and
+    the ending of a loop.
     """
 
     case: int
     draws: Mapping[str, float]
     values: Sequence[float]
-    angles: Array | None = None
     stop: Ending | None = None
 
 
@@ -348,9 +347,7 @@ ESTIMATE = -1  # number of the nominal case
 
 
 def _flown(study: Study, case: int, draws: Mapping[str, float]) -> CaseRow:
-    aspects = study.ends_of(draws).aspects
-    angles = None if aspects is None else aspects[:, :, 0]
-    return CaseRow(case, draws, study.outputs_of(draws).tolist(), angles)
+    return CaseRow(case, draws, study.outputs_of(draws).tolist())
 
 
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
@@ -376,7 +373,7 @@ def case_table(
         return math.degrees(true(entry, row)) if entry.unit == "rad" else true(entry, row)
 
     def angle(at: int, end: int, row: CaseRow) -> float | None:
-        return None if row.angles is None else math.degrees(row.angles[at][end])
+        return math.degrees(row.values[len(outputs) + 2 * at + end])
 
     def output_of(at: int, row: CaseRow) -> float | None:
         value = row.values[at]

@@ -57,12 +57,7 @@ def worst_cases(results: LoopResults, count: int) -> DataTable:
     """`case_table` of so many cases, the worst first."""
     study = results.study
     rows = [
-        CaseRow(
-            case,
-            study.draws_of(case),
-            results.values[:, case].tolist(),
-            results.angles[:, :, case],
-        )
+        CaseRow(case, study.draws_of(case), results.values[:, case].tolist())
         for case in results.worst.cases[:count].tolist()
     ]
     return dispersion.case_table(study, SHOWN_OUTPUTS, rows)
@@ -71,7 +66,7 @@ def worst_cases(results: LoopResults, count: int) -> DataTable:
 def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> CaseRow:
     values = study.measured(flown)[0][:, 0].tolist()
     ending = flown.pilots[0].ending[0]
-    return CaseRow(case, study.draws_of(case), values, flown.aspects[:, :, 0], ending)
+    return CaseRow(case, study.draws_of(case), values, ending)
 
 
 def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True) -> RenderableType:
@@ -195,7 +190,7 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist(), study.nominal_aspects)
+    nominal = CaseRow(dispersion.ESTIMATE, {}, study.nominal.tolist())
     told = [Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim")]
     if row.stop is not None and row.stop is not Ending.END:
         told.insert(0, Text.assemble(("Stopped: ", "bold red"), f"{row.stop.value}."))
@@ -260,10 +255,8 @@ class LoopCasesWriter:
         stream.write(self._table.csv().encode())
         stream.flush()
 
-    def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
-        """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m,
-        2, n) rad.
-        """
+    def write(self, first: int, values: Array, stops: list[Ending]) -> None:
+        """Write the cases from ``first`` (from 0) on, with their values (rows, n)."""
         numbers = np.arange(first, first + len(stops))
         drawn = {
             name: np.broadcast_to(draws, numbers.shape).tolist()
@@ -274,7 +267,6 @@ class LoopCasesWriter:
                 first + row,
                 {name: draws[row] for name, draws in drawn.items()},
                 values[:, row].tolist(),
-                angles[..., row],
                 stop,
             )
             for row, stop in enumerate(stops)

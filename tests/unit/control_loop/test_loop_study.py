@@ -452,23 +452,24 @@ def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> Non
         body, keep=(Keep("star", at, most=rad(5.0)), Keep("Sun", -at, least=rad(174.0)))
     )
     free, kept = (results_of(each, 40) for each in (body, watched))
-    assert kept.values == pytest.approx(free.values, nan_ok=True)
+    assert kept.values[: len(OUTPUTS)] == pytest.approx(free.values, nan_ok=True)
+    kept_angles = kept.study.left(kept.values).angles
     alone = []
     for case in range(12):
         seen = loop_of(watched, 60.0, seed=3, case=case)
         angles = np.array([(each.least, each.largest) for each in seen._aspects])
-        assert kept.angles[:, :, case] == pytest.approx(angles, abs=rad(2e-3))
+        assert kept_angles[:, :, case] == pytest.approx(angles, abs=rad(2e-3))
         alone.append(seen.meets_requirement)
     assert len(set(alone)) == 2
-    broken = (kept.angles[0, 1] > rad(5.0)) | (kept.angles[1, 0] < rad(174.0))
+    broken = (kept_angles[0, 1] > rad(5.0)) | (kept_angles[1, 0] < rad(174.0))
     assert 0 < np.count_nonzero(broken) < 40
     assert kept.met == np.count_nonzero(~broken) - (free.done - free.met)
     assert alone == [not each for each in broken[:12]]
     assert kept.broken.tolist() == [
-        np.count_nonzero(kept.angles[0, 1] > rad(5.0)),
+        np.count_nonzero(kept_angles[0, 1] > rad(5.0)),
         int(kept.broken[1]),
     ]
-    assert kept.aspects[0] == pytest.approx([kept.angles[0, 0].min(), kept.angles[0, 1].max()])
+    assert kept.aspects[0] == pytest.approx([kept_angles[0, 0].min(), kept_angles[0, 1].max()])
     only = results_of(replace(watched, requirement=None), 40)
     assert only.met_fraction == pytest.approx(np.mean(~broken))
 
