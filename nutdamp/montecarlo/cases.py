@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nutdamp.common.numerics import TINY, cos_sin
 from nutdamp.flight.dynamics import Supply, shed
-from nutdamp.montecarlo.inputs import BY_VALVE, TENSOR, Draws, Group, groups_of, list_inputs
+from nutdamp.montecarlo.inputs import BY_VALVE, TANK, TENSOR, Draws, Group, groups_of, list_inputs
 from nutdamp.physics import attitude
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.thruster import Cold, Measured, Opened, Tank, Trapezoid, action, possible
@@ -71,9 +71,8 @@ def tank_of(spacecraft: Spacecraft, draws: Draws) -> Tank | None:
     """Tank of the cases."""
     if spacecraft.tank is None:
         return None
-    names = ("propellant", "pressure", "final_pressure", "exponent")
     changed = {
-        name: getattr(spacecraft.tank, name) + draws.get(f"tank {name}", 0.0) for name in names
+        name: getattr(spacecraft.tank, name) + draws.get(f"tank {name}", 0.0) for name in TANK
     }
     return replace(spacecraft.tank, **changed)
 

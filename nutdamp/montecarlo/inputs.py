@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
@@ -28,6 +28,8 @@ from nutdamp.spacecraft.equipment import ACCELEROMETER, Thruster
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+
+Array = NDArray[np.float64]
 
 SPREAD = {
     "normal": 1.0,
@@ -46,6 +48,11 @@ TENSOR = {
     for column in range(row, 3)
 }
 """Inputs of the inertia tensor, and the row and column of each."""
+
+TANK = {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}
+"""Dispersed values of a tank, and their units."""
+
+SENSED = ("bias", "scale", "noise", "delay")  # tolerances of the sensor of a loop
 
 KNOWN_BY_TORQUE = "the file gives only its torque, not position and direction of its force"
 
@@ -86,24 +93,27 @@ class _Row(NamedTuple):
     """Inputs of one tolerance of the file; ``idle`` says why they touch nothing, empty: they do."""
 
     key: str
-    tolerance: Tolerance | None
     names: Sequence[str]
-    nominal: float
-    unit: str
+    nominal: float = 0.0
+    unit: str = ""
     idle: str = ""
+    tolerance: Tolerance | None = None  # None: that of the key
 
 
 def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
     """Inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
-    return _listed(_rows(spacecraft, schedule))
+    requested = spacecraft.dispersions
+    rows = [] if requested is None else _rows(spacecraft, requested, schedule)
+    return _listed(requested, rows)
 
 
-def _listed(rows: Iterable[_Row]) -> Inputs:
+def _listed(requested: Dispersions | None, rows: Iterable[_Row]) -> Inputs:
     """Inputs, whose relative sizes become absolute, and unused tolerances, those too whose size is
     zero.
     """
     drawn, unused = list[DispersedInput](), list[Unused]()
-    for key, tolerance, names, nominal, unit, idle in rows:
+    for key, names, nominal, unit, idle, own in rows:
+        tolerance = own or getattr(requested, key, None)
         if tolerance is None:
             continue
         size = tolerance.size * (nominal if tolerance.relative else 1.0)
@@ -141,90 +151,95 @@ def with_sensor(spacecraft: Spacecraft, fired: Inputs, idle: str) -> Inputs:
     """Inputs of a loop by those of what is ``fired``, and of its sensor; ``idle`` in place of
     `SCHEDULE_IDLE`.
     """
-    sensor = _listed(_of_sensor(spacecraft))
+    loop = spacecraft.loop
+    rows = []
+    if loop is not None:
+        sensor = loop.sensor
+        axes, unit = ([""], "m/s²") if sensor.kind == ACCELEROMETER else ([" 1", " 2"], "rad/s")
+        silent = "" if sensor.noise else "the sensor has no noise"
+        rows = [
+            _Row("sensor_bias", [f"sensor bias{axis}" for axis in axes], sensor.bias, unit),
+            _Row("sensor_scale", [f"sensor scale{axis}" for axis in axes], 1.0),
+            _Row("sensor_noise", ["sensor noise"], 1.0, "", silent),
+            _Row("sensor_delay", ["sensor delay"], sensor.delay, "s"),
+        ]
+    seen = _listed(spacecraft.dispersions, rows)
     rest = (entry for entry in fired.unused if not entry.name.startswith("sensor "))
     unused = (entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, idle)) for entry in rest)
-    return Inputs((*fired.drawn, *sensor.drawn), (*unused, *sensor.unused))
+    return Inputs((*fired.drawn, *seen.drawn), (*unused, *seen.unused))
 
 
-def _of_sensor(spacecraft: Spacecraft) -> Iterator[_Row]:
-    """Bias and scale of each gyro, noise and delay; none for a spacecraft without sensor."""
-    requested, loop = spacecraft.dispersions, spacecraft.loop
-    if requested is None or loop is None:
-        return
-    sensor = loop.sensor
-    axes, unit = ([""], "m/s²") if sensor.kind == ACCELEROMETER else ([" 1", " 2"], "rad/s")
-    silent = "" if sensor.noise else "the sensor has no noise"
-    yield _Row(
-        "sensor_bias",
-        requested.sensor_bias,
-        [f"sensor bias{axis}" for axis in axes],
-        sensor.bias,
-        unit,
-    )
-    yield _Row(
-        "sensor_scale", requested.sensor_scale, [f"sensor scale{axis}" for axis in axes], 1.0, ""
-    )
-    yield _Row("sensor_noise", requested.sensor_noise, ["sensor noise"], 1.0, "", silent)
-    yield _Row("sensor_delay", requested.sensor_delay, ["sensor delay"], sensor.delay, "s")
-
-
-def _rows(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[_Row]:
-    requested, inertia = spacecraft.dispersions, spacecraft.inertia
-    if requested is None:
-        return
-    yield _Row("A", requested.A, ["A"], inertia.A, "kg m²")
-    yield _Row("C", requested.C, ["C"], inertia.C, "kg m²")
-    tensor, spread = inertia.tensor, requested.inertia_tensor
-    for name, (row, column) in TENSOR.items():
-        size = math.sqrt(tensor[row, row] * tensor[column, column])
-        entry = spread and replace(
-            spread, size=spread.size * (size if spread.relative else 1.0), relative=False
-        )
-        yield _Row("inertia_tensor", entry, [name], float(tensor[row, column]), "kg m²")
-    yield _Row(
-        "wheel_momentum", requested.wheel_momentum, ["wheel momentum"], inertia.wheel, "N m s"
-    )
-    for at, rate in enumerate((inertia.axes @ spacecraft.omega0).tolist()):
-        yield _Row("omega0", requested.omega0[at], [f"omega0_{at + 1}"], rate, "rad/s")
+def _rows(spacecraft: Spacecraft, requested: Dispersions, schedule: Schedule) -> list[_Row]:
+    """Inputs in the order of their listing: body and motion, thrusters, supply, pulses, attitude,
+    sensor.
+    """
+    inertia, cold, tank = spacecraft.inertia, spacecraft.cold, spacecraft.tank
     members = _fired(spacecraft, schedule)
-    for key in ("thrust", "thrust_direction", "position", *BY_VALVE):
-        for name, tolerance in getattr(requested, key).items():
-            yield _of_thruster(key, name, tolerance, members)
     thrusters = [thruster for thruster in members.values() if thruster is not None]
-    idle = KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster"
-    idle = "" if any(each.force is not None for each in thrusters) else idle
-    yield _Row(
-        "center_of_mass",
-        requested.center_of_mass,
-        [f"center of mass {a}" for a in "xyz"],
-        0.0,
-        "m",
-        idle,
-    )
-    yield from _feed(spacecraft, requested, "" if thrusters else "the schedule fires no thruster")
+    pushed = any(each.force is not None for each in thrusters)
+    by_torque = KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster"
+    unfed = "" if thrusters else "the schedule fires no thruster"
+    of_cold = "the file has no cold nozzles" if cold is None else unfed
+    of_tank = "the file has no tank" if tank is None else unfed
+    light = shed(spacecraft) is None and tank is not None
+    per_kg = "the tank has no inertia_per_kg" if light else of_tank
     numbers = range(1, len(schedule) + 1)
-    idle = "" if len(schedule) else "the schedule has no pulses"
+    no_pulses = "" if len(schedule) else "the schedule has no pulses"
     thrusts = [f"thrust pulse {number}" for number in numbers] or ["thrust per pulse"]
-    yield _Row("thrust_per_pulse", requested.thrust_per_pulse, thrusts, 1.0, "", idle)
-    yield _Row(
-        "timing",
-        requested.timing,
-        [f"timing pulse {n}" for n in numbers] or ["timing"],
-        0.0,
-        "s",
-        idle,
-    )
-    yield _Row("timing_offset", requested.timing_offset, ["timing offset"], 0.0, "s", idle)
-    sensor = spacecraft.sun_sensor
-    if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
-        jitter = Tolerance("normal", sensor.jitter)
-        names = [f"Sun pulse {number}" for number in dict.fromkeys(schedule.fired_with)]
-        yield _Row("sun_sensor.jitter", jitter, names, 0.0, "s")
-    yield _Row("attitude", requested.attitude, ["attitude x", "attitude y"], 0.0, "rad")
-    idle = "a schedule does not use the sensor; --loop flies the loop"
-    for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
-        yield _Row(key, getattr(requested, key), [key.replace("_", " ")], 0.0, "", idle)
+    timings = [f"timing pulse {number}" for number in numbers] or ["timing"]
+    unseen = "a schedule does not use the sensor; --loop flies the loop"
+    sun = spacecraft.sun_sensor
+    jitter = sun.jitter if schedule.blocks and sun is not None else 0.0
+    fired_with = dict.fromkeys(schedule.fired_with) if jitter > 0.0 else ()
+    passages = [f"Sun pulse {number}" for number in fired_with]
+    return [
+        _Row("A", ["A"], inertia.A, "kg m²"),
+        _Row("C", ["C"], inertia.C, "kg m²"),
+        *_of_tensor(inertia.tensor, requested.inertia_tensor),
+        _Row("wheel_momentum", ["wheel momentum"], inertia.wheel, "N m s"),
+        *(
+            _Row("omega0", [f"omega0_{at + 1}"], rate, "rad/s", "", requested.omega0[at])
+            for at, rate in enumerate((inertia.axes @ spacecraft.omega0).tolist())
+            if requested.omega0[at] is not None
+        ),
+        *(
+            _of_thruster(key, name, tolerance, members)
+            for key in ("thrust", "thrust_direction", "position", *BY_VALVE)
+            for name, tolerance in getattr(requested, key).items()
+        ),
+        _Row(
+            "center_of_mass",
+            [f"center of mass {axis}" for axis in "xyz"],
+            0.0,
+            "m",
+            "" if pushed else by_torque,
+        ),
+        _Row("cold", ["cold"], getattr(cold, "first", 0.0), "", of_cold),
+        _Row("cold_pulses", ["cold_pulses"], getattr(cold, "pulses", 0.0), "", of_cold),
+        *(
+            _Row(f"tank_{name}", [f"tank {name}"], getattr(tank, name, 0.0), unit, of_tank)
+            for name, unit in TANK.items()
+        ),
+        _Row("inertia_per_kg", ["inertia_per_kg"], 1.0, "", per_kg),
+        _Row("thrust_per_pulse", thrusts, 1.0, "", no_pulses),
+        _Row("timing", timings, 0.0, "s", no_pulses),
+        _Row("timing_offset", ["timing offset"], 0.0, "s", no_pulses),
+        _Row("sun_sensor.jitter", passages, 0.0, "s", "", Tolerance("normal", jitter)),
+        _Row("attitude", ["attitude x", "attitude y"], 0.0, "rad"),
+        *(_Row(f"sensor_{name}", [f"sensor {name}"], 0.0, "", unseen) for name in SENSED),
+    ]
+
+
+def _of_tensor(tensor: Array, spread: Tolerance | None) -> list[_Row]:
+    """Components of the inertia tensor, of which a relative spread is that of moments."""
+    if spread is None:
+        return []
+    rows = []
+    for name, (row, column) in TENSOR.items():
+        size = math.sqrt(tensor[row, row] * tensor[column, column]) if spread.relative else 1.0
+        own = replace(spread, size=spread.size * size, relative=False)
+        rows.append(_Row("inertia_tensor", [name], float(tensor[row, column]), "kg m²", "", own))
+    return rows
 
 
 def _fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
@@ -271,39 +286,9 @@ def _of_thruster(
     else:
         axes, unit = ("xyz", "m") if key == "position" else ("ab", "rad")
         names = [f"{called} {axis}" for axis in axes]
-    return _Row(key, tolerance, names, nominal, unit, idle)
+    return _Row(key, names, nominal, unit, idle, tolerance)
 
 
-def _feed(spacecraft: Spacecraft, requested: Dispersions, idle: str) -> Iterator[_Row]:
-    """Tolerances of cold nozzles and of the tank; ``idle`` where no thruster fires."""
-    cold, tank = spacecraft.cold, spacecraft.tank
-    of_cold = "the file has no cold nozzles" if cold is None else idle
-    yield _Row("cold", requested.cold, ["cold"], getattr(cold, "first", 0.0), "", of_cold)
-    yield _Row(
-        "cold_pulses",
-        requested.cold_pulses,
-        ["cold_pulses"],
-        getattr(cold, "pulses", 0.0),
-        "",
-        of_cold,
-    )
-    of_tank = "the file has no tank" if tank is None else idle
-    for name, unit in {
-        "propellant": "kg",
-        "pressure": "Pa",
-        "final_pressure": "Pa",
-        "exponent": "",
-    }.items():
-        key = f"tank_{name}"
-        yield _Row(
-            key, getattr(requested, key), [f"tank {name}"], getattr(tank, name, 0.0), unit, of_tank
-        )
-    if tank is not None and shed(spacecraft) is None:
-        of_tank = "the tank has no inertia_per_kg"
-    yield _Row("inertia_per_kg", requested.inertia_per_kg, ["inertia_per_kg"], 1.0, "", of_tank)
-
-
-Array = NDArray[np.float64]
 Pair = tuple[str, str, float]  # names of two inputs, and their correlation
 NODES = 96  # nodes of the quadrature for the correlation of values that are not normal
 
