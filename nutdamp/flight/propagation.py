@@ -474,14 +474,11 @@ def _allowed(schedule: Schedule, until: float) -> int:
 
 def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
     """Angle (n,) in [0, 2π) by which the body has to turn until the Sun passes the sensor."""
-    spacecraft = flown.spacecraft
-    assert spacecraft.sun_sensor is not None
-    assert spacecraft.sun is not None
-    _, quaternions = flown.motion(times)
-    seen = attitude.rotate(attitude.conjugate(quaternions), spacecraft.sun)
-    azimuth = np.arctan2(seen[:, 1], seen[:, 0])
-    return np.asarray(
-        math.copysign(1.0, spacecraft.spin)
-        * (azimuth - spacecraft.sun_sensor.azimuth)
-        % (2.0 * math.pi)
-    )
+    from nutdamp.physics.sky import ahead  # a Sun sensor
+
+    sensor, sun = flown.spacecraft.sun_sensor, flown.spacecraft.sun
+    assert sensor is not None
+    assert sun is not None
+    rates, quaternions = flown.motion(times)
+    sense = math.copysign(1.0, flown.spacecraft.spin)
+    return ahead(rates.T, quaternions.T, sun[:, None], sensor.azimuth, sense)[0]
