@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.errors import BadRequest, CannotWrite
-from nutdamp.figures import geometry, overview, sphere, style
+from nutdamp.figures import geometry, overview, style
 from nutdamp.figures.style import INK, MOTION, PAPER
 from nutdamp.flight.propagation import Flight
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -244,7 +244,7 @@ class Scene:
         self.canvas = FigureCanvasAgg(self.figure)
         self.path = geometry.drawn(flight, track)
         self.plane = geometry.sky_plane(flight, track.momentum[0])
-        self.looked = sphere.view(flight, self.path)
+        self.looked = geometry.view(flight, self.path)
         self._changing: list[Artist] = []
         # The parts that do not move, with room for those that do.
         figure = self.figure
@@ -260,8 +260,8 @@ class Scene:
         rims = np.vstack(
             [part for at in cones for part in (at.body, at.space, at.axis[None], at.rotation[None])]
         )
-        sphere.draw_ground(self.space, self.looked, self.path)
-        sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
+        geometry.draw_ground(self.space, self.looked, self.path)
+        geometry.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
         self.space.set_title(f"Cones{self.looked.scale}")
         shown = geometry.on_sky(self.plane, np.vstack([rims, self.path.axis]))
         style.square(self.sky, shown, margin=0.06)
@@ -269,7 +269,7 @@ class Scene:
         self.sky.set(xlabel=x, ylabel=y, title=f"Seen along H(0)\n{sense}")
         overview.nutation_history(self.strip, flight, self.path)
         self.strip.set(xlabel=overview.TIME)
-        sphere.name_directions(self.sky)
+        geometry.name_directions(self.sky)
         style.legend(figure, [self.sky, self.strip])
         self.title = figure.suptitle(self.caption(0.0))
         figure.draw_without_rendering()
@@ -290,9 +290,9 @@ class Scene:
         cones = self.cones(number)
         kept = {artist for axes in self.figure.axes for artist in axes.get_children()}
         done = self.path.t <= now
-        sphere.draw_cones(self.space, self.looked, cones)
-        sphere.draw_line(self.space, self.looked, self.path.axis[done], MOTION, 0.9)
-        sphere.draw_circles(self.sky, self.plane, cones)
+        geometry.draw_cones(self.space, self.looked, cones)
+        geometry.draw_line(self.space, self.looked, self.path.axis[done], MOTION, 0.9)
+        geometry.draw_circles(self.sky, self.plane, cones)
         if self.timed.until * abs(self.flight.spacecraft.spin) < MARKED * self.timed.frames:
             mark = geometry.body_mark(cones, self.quaternions[number])[None]
             self.space.plot(*self.looked.seen(mark)[0].T, "D", color=MOTION, markersize=4)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.figures import geometry, sphere, style
+from nutdamp.figures import geometry, style
 from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PAPER, PULSE, THIN
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
@@ -78,8 +78,8 @@ def flight_figure(
         "course": [sky],
     }
     planes = named[name]
-    if name == "overview" and sphere.has_globe(flight, seen):
-        planes.append(partial(sphere.draw_globe, flight=flight, track=seen))
+    if name == "overview" and geometry.has_globe(flight, seen):
+        planes.append(partial(geometry.draw_globe, flight=flight, track=seen))
     courses = [] if name == "motion" else [*_courses(flight, seen, rates=name == "overview")]
     sizes = [height for _, height in courses]
     if name == "course" and not narrow:
@@ -262,7 +262,7 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
         groups.setdefault(turn % round(2.0 * math.pi / ALIKE), []).append(channel)
     for group in groups.values():
         torque = group[0].transverse / abs(group[0].transverse)
-        way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
+        way = np.array([torque.real, torque.imag]) * (size if size > style.LEAST else 0.7)
         axes.plot(*np.outer(way, [1.1, 1.28]), color=INK, linewidth=1.2)
         style.head(axes, np.outer([1.1, 1.3], way), 1, INK)
         names = ", ".join(entry.name for entry in group[:3]) + (" …" if len(group) > 3 else "")
@@ -337,7 +337,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
     """Nutation θ on a log axis with the band that is required, and its last value."""
     angles = np.degrees(track.nutation)
     limit = style.limit_of(flight.spacecraft, Part.NUTATION)
-    most = max(float(angles.max()), geometry.LEAST)
+    most = max(float(angles.max()), style.LEAST)
     bound = math.inf if limit is None else limit
     low = max(
         0.5 * min(float(angles.min()), bound, 0.1 * most), min(most * 10.0**-DECADES, 0.1 * bound)
@@ -360,7 +360,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
 def _rate_history(axes: Axes, flight: Flight, track: Track, parts: tuple[int, ...]) -> None:
     """Rates about the axes ``parts``, from 0."""
     rates = np.degrees(track.rates)
-    rates[np.abs(rates) < geometry.LEAST] = 0.0
+    rates[np.abs(rates) < style.LEAST] = 0.0
     turns = float(track.t[-1]) / flight.spacecraft.body_period / 2.5
     width = style.thickness(rates, turns) if len(parts) > 1 else style.LINE
     for part in parts:

@@ -297,7 +297,7 @@ def acceptance(axes: Axes, judged: Verdict, others: Sequence[Verdict] = ()) -> N
     farthest = np.max(tops[within], axis=0, initial=0.0)
     bounded = np.isfinite(limits)
     near = np.clip(1.1 * farthest, SPARE * limits, REACH * limits)
-    ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), geometry.LEAST)
+    ends = np.maximum(np.where(bounded, near, SPARE * tops.max(axis=0)), style.LEAST)
     right, top = np.where(bounded, limits, 2.0 * ends)
     axes.fill_between([0.0, right], top, **style.BAND)
     axes.plot([right, right, 0.0], [0.0, top, top], **{**style.LIMIT, "label": None})

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp.errors import MissingExtra
-from nutdamp.figures.geometry import room
 from nutdamp.planning.verdict import Light
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part, required
@@ -77,6 +76,7 @@ BAND: dict[str, Any] = {"facecolor": GREY, "alpha": 0.16, "linewidth": 0.0}
 # Ground under a hollow mark; in a page, its background.
 PAPER = "#fefefe"
 
+LEAST = 1e-9  # degrees or deg/s below which a motion is drawn as a point
 LINE, THIN = 1.3, 0.7  # line widths, points
 SMALL, TICK_SIZE = 7.5, 8  # sizes of labels inside a panel and of those of its ticks, points
 NOTE: dict[str, Any] = {"fontsize": SMALL, "fontweight": "normal"}  # look of a remark above a panel
@@ -201,6 +201,17 @@ def words(axes: Axes, text: str) -> None:
     """Words in a panel that has nothing to show; no ticks, since there is no scale to read."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
     axes.set(xticks=[], yticks=[])
+
+
+def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
+    """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero
+    in the middle.
+    """
+    low = points.min(axis=0)
+    high = points.max(axis=0)
+    middle = np.zeros(2) if centre else 0.5 * (low + high)
+    half = (1.0 + margin) * float(np.abs(points - middle).max())
+    return middle, half if half > LEAST else 1.0
 
 
 def square(

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from nutdamp.figures import geometry
+from nutdamp.figures import geometry, style
 from nutdamp.figures.overview import NO_OUTLINES
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
@@ -108,8 +108,8 @@ def moving_of(
     reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
     if not (named and np.all(np.hypot(*target.T) <= reach)):
         target = np.empty((0, 2))
-    pole_room = geometry.room(pole, 0.1, centre=True)
-    sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
+    pole_room = style.room(pole, 0.1, centre=True)
+    sky_room = style.room(np.vstack([sky, momentum, target]), 0.1)
     end = sky[-1] + END * sky_room[1] * geometry.circle()
     lines = [(kind, placed(line, *sky_room)) for kind, line in {**outlines, "end": end}.items()]
     x, y, _ = geometry.sky_names(flown)
@@ -118,7 +118,7 @@ def moving_of(
     # Whole numbers of the last decimal: four figures of the largest nutation.
     largest = math.degrees(float(track.nutation.max()))
     cone = ANGLE_DIGITS
-    if largest >= geometry.LEAST:
+    if largest >= style.LEAST:
         cone = max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
     clock = max(3, math.ceil(-math.log10(until / (len(track.t) - 1))) + 1)
     # The angles of the spin axis, as every table shows them.
@@ -351,10 +351,10 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[dict[str, Any],
     spacecraft = flown.spacecraft
     cones = np.degrees(np.concatenate([track.body_cone, track.space_cone]))
     theta = np.degrees(track.nutation)
-    apart = float(np.abs(cones).max()) > APART * max(float(theta.max()), geometry.LEAST)
+    apart = float(np.abs(cones).max()) > APART * max(float(theta.max()), style.LEAST)
     angles = np.concatenate([theta, [0.0]] if apart else [theta, cones, [0.0]])
     size = float(np.ptp(angles))
-    margin = 0.06 * size if size > geometry.LEAST else 1.0
+    margin = 0.06 * size if size > style.LEAST else 1.0
     low = float(angles.min()) - margin
     high = float(angles.max()) + margin
     width, height = 2000, 1000  # in units of the SVG

@@ -42,7 +42,7 @@ from support.shown import (
     texts,
 )
 
-from nutdamp.figures import geometry, overview, sphere, style
+from nutdamp.figures import geometry, overview, style
 from nutdamp.figures.image import Scene, Timing, rendered
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation
@@ -337,14 +337,14 @@ def test_what_is_magnified_says_so() -> None:
     told = present(re.search(r"angles × (\S+)\)", scene.space.get_title()))
     assert float(told[1]) == scene.looked.magnified > 1.0
     for widest in np.radians([1e-7, 1e-3, 0.01, 0.3, 1.0, 5.0, 13.9, 14.1, 80.0]).tolist():
-        much = sphere.magnification(widest)
-        if widest >= sphere.WIDE:
+        much = geometry.magnification(widest)
+        if widest >= geometry.WIDE:
             assert much == 1.0
         else:
             assert (
-                0.4 * np.tan(sphere.DRAWN)
+                0.4 * np.tan(geometry.DRAWN)
                 < much * np.tan(widest)
-                <= np.tan(sphere.DRAWN) * (1 + 1e-9)
+                <= np.tan(geometry.DRAWN) * (1 + 1e-9)
             )
 
 
@@ -352,7 +352,7 @@ def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch()
     """Whatever the magnification: on paper the rims have one tangent where ω ends."""
     for case in ("0.01°", "wide pulses", "needle at 60°"):
         made, track = flown(case)
-        looked = sphere.view(made, track)
+        looked = geometry.view(made, track)
         cones = geometry.cones(made, track.rates[0], track.quaternion[0])
         assert np.isfinite(looked.seen(cones.rotation)[0][0]).all()
         steps = [1e-5 * np.cross(axis, cones.rotation) for axis in (cones.axis, cones.momentum)]
@@ -369,10 +369,10 @@ def test_seen_from_outside_the_three_axes_lie_in_one_plane_and_the_cones_touch()
 @pytest.mark.parametrize("case", ["three moments", "three moments, oblate", "oblate", "reversed"])
 def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None:
     made, track = flown(case)
-    looked = sphere.view(made, track)
+    looked = geometry.view(made, track)
     cones = geometry.cones(made, track.rates[0], track.quaternion[0])
     axes = Figure().subplots()
-    sphere.draw_cones(axes, looked, cones)
+    geometry.draw_cones(axes, looked, cones)
     filled = [
         patch for patch in axes.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 3
     ]
