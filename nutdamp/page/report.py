@@ -49,9 +49,9 @@ from nutdamp.page.document import (
     Points,
     Prose,
     fact_list,
+    manoeuvre_blocks,
     sheet,
 )
-from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.planning.causes import broken_limits
 from nutdamp.planning.decision import Comparison
