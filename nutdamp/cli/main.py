@@ -28,7 +28,14 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from nutdamp import __version__
-from nutdamp.errors import Infeasible, cure_of, printable
+from nutdamp.errors import (
+    BadRequest,
+    FaultyFile,
+    Infeasible,
+    NutdampError,
+    cure_of,
+    printable,
+)
 from nutdamp.units import SI, screen_units
 
 if TYPE_CHECKING:
@@ -94,8 +101,10 @@ def run(group: click.Group) -> None:
         _silence_stdout()
         say(f"nutdamp: cannot write standard output: {wrong.strerror or wrong}")
         status = UNREADABLE
-    except Exception as wrong:
-        status = _explain(wrong)
+    except NutdampError as wrong:
+        tell(wrong)
+        refused = BAD_INPUT if isinstance(wrong, BadRequest | FaultyFile) else UNREADABLE
+        status = INFEASIBLE if isinstance(wrong, Infeasible) else refused
     sys.exit(status if isinstance(status, int) else DONE)
 
 
@@ -118,21 +127,7 @@ def _silence_stdout() -> None:
 
 def tell(wrong: Exception) -> None:
     """Print an error on standard error, behind the name of its file or of the program."""
-    from nutdamp.errors import FaultyFile
-
     say(str(wrong) if isinstance(wrong, FaultyFile) else f"nutdamp: {wrong}")
-
-
-def _explain(wrong: Exception) -> int:
-    """Print an error that the user can cure, and return its exit status; a bug is raised again."""
-    from nutdamp.errors import BadRequest, FaultyFile, NutdampError
-
-    if not isinstance(wrong, NutdampError):
-        raise wrong
-    tell(wrong)
-    if isinstance(wrong, Infeasible):
-        return INFEASIBLE
-    return BAD_INPUT if isinstance(wrong, BadRequest | FaultyFile) else UNREADABLE
 
 
 # --- what is printed

@@ -414,17 +414,13 @@ def _dispersion(chosen: Plan, judged: Verdict, results: Results) -> Iterator[Blo
             yield Prose(line.plain)
     if study.lightening_error:
         yield Prose(f"Note: {study.lightening_error}.")
-    if results.emptied:
-        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
-        yield Prose(f"Tank empty too soon in {share} of cases: {dispersion.EMPTY}.")
     dispersed = Dispersion(results, plan=chosen)
     vars(dispersed)["verdict"] = judged
     yield picture("momentum", partial(studies.dispersion_figure, dispersed, "momentum"))
-    redrawn = f", unphysical and drawn again: {results.redrawn:,}" if results.redrawn else ""
     yield Details(
         "Percentiles, tolerance budget and worst cases",
         (
-            Prose(f"{chosen.scheme}; cases: {results.done:,}, seed {study.seed}{redrawn}"),
+            Prose(f"{chosen.scheme}; {dispersion.drawn(results)}"),
             *_cases(chosen, results),
         ),
     )

@@ -308,7 +308,7 @@ def check_parts(
 ) -> tuple[list[tuple[str, str]], list[DataTable], list[Note]]:
     """Names and values, tables, and notes of the screen."""
     notes = ordered([*warnings(spacecraft), *_notes(spacecraft, verbose=verbose)])
-    details = derived_facts(spacecraft)
+    details = [*derived_facts(spacecraft)]
     if not verbose:
         return details, [channel_table(spacecraft)] if spacecraft.channels else [], notes
     details += [*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)]

@@ -141,12 +141,8 @@ def derived_table(spacecraft: Spacecraft) -> Table:
     return facts(derived_facts(spacecraft))
 
 
-def derived_facts(spacecraft: Spacecraft) -> list[tuple[str, str]]:
+def derived_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     """Names and values of the derived quantities of the spacecraft at t = 0."""
-    return [*_derived(spacecraft), *aspect_facts(at_start(spacecraft))]
-
-
-def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     inertia = spacecraft.inertia
     motion = spacecraft.widest
     moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
@@ -206,6 +202,7 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     bounds = required(spacecraft)
     if bounds:
         yield "requirement", bounds
+    yield from aspect_facts(at_start(spacecraft))
 
 
 def plan_json(plan: Plan) -> dict[str, Any]:

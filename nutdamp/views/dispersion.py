@@ -119,10 +119,6 @@ def dispersion_screen(
     how = "ideal impulses" if ideal else "full simulation"
     title = named(study.model.spacecraft, f": {flown.plan.scheme}, {how}; {drawn(results)}")
     head = [title, *verdict_lines(judged, results)]
-    if results.emptied:
-        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
-        words = (f"empty too soon in {share} of cases", "red")
-        head.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
     percentiles = percentile_table(results, FLOWN_OUTPUTS, study.outputs_of({}), alone=True)
     varies = any(entry.sigma for entry in study.model.inputs.drawn)
     notes = [*unused_notes(study.model.inputs.unused), *planned]
@@ -137,11 +133,14 @@ def dispersion_screen(
             Text("Nominal case", style="bold"),
             facts(end_rows(flown.plan._flight, flown.plan._aspects)),
         ),
-        Group(*tolerance_budget(results)),
     ]
+    budget, caption = budget_of(results)
+    tables.append(Text(caption) if budget is None else captioned(budget, caption))
     if worst and varies:
         cases = worst_cases(results, worst)
-        tables.append(inspected(cases, f"nutdamp disperse, as here, with {again(results)}"))
+        tables.append(
+            captioned(cases, f"Inspect one: nutdamp disperse, as here, with {again(results)}")
+        )
     return Summary(head, lambda: tables, notes, verbose=True)
 
 
@@ -151,10 +150,9 @@ def drawn(results: Results | LoopResults) -> str:
     return f"cases: {results.done:,}, seed {results.study.seed}{redrawn}"
 
 
-def inspected(cases: DataTable, command: str) -> Group:
-    """The table of the worst cases, and the ``command`` that shows one of them."""
-    one = Text(f"Inspect one: {command}", "dim")
-    return Group(Text(cases.title, "bold"), cases.screen("screen"), one)
+def captioned(table: DataTable, caption: str) -> Group:
+    """A table of the screen below its title, and its caption."""
+    return Group(Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim"))
 
 
 def dispersion_json(flown: Dispersion, *, worst: int) -> dict[str, Any]:
@@ -289,7 +287,7 @@ def beside(value: float, largest: float) -> str:
 
 
 def verdict_lines(judged: Verdict, results: Results | LoopResults) -> list[RenderableType]:
-    """The verdict, a row for each bound, and what more cases would show."""
+    """The verdict, what more cases would show, a row for each bound, and tanks that run empty."""
     parts: list[RenderableType] = [verdicts.coloured(*verdicts.stated(judged))]
     if judged.cases is not None and judged.cases.complying is not None:
         low, high, probability = judged.cases.low, judged.cases.high, judged.cases.probability
@@ -300,6 +298,10 @@ def verdict_lines(judged: Verdict, results: Results | LoopResults) -> list[Rende
         elif results.done < few:
             parts.append(Text(f"It takes at least {few:,} cases to show it."))
     parts.append(verdicts.bound_table(judged).screen("screen"))
+    if isinstance(results, Results) and results.emptied:
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        words = (f"empty too soon in {share} of cases", "red")
+        parts.append(Text.assemble(("Tank ", "bold"), words, f": {EMPTY}."))
     return parts
 
 
@@ -518,14 +520,6 @@ MAIN = 0.1  # least share of the variance of a main cause
 MOST_ROWS = 12  # largest number of inputs that the budget names; the rest is summed up
 TINY = 1e-300
 ROUNDING = 1e-12  # rad; a smaller variation is rounding
-
-
-def tolerance_budget(results: Results) -> list[RenderableType]:
-    """The table of `budget_of` under its title, and its caption."""
-    table, caption = budget_of(results)
-    if table is None:
-        return [Text(caption)]
-    return [Text(table.title, "bold"), table.screen("screen"), Text(caption, "dim")]
 
 
 def budget_of(results: Results) -> tuple[DataTable | None, str]:

@@ -89,8 +89,8 @@ def loop_cases_screen(flown: LoopDispersion, *, worst: int, verbose: bool = True
     if anew:
         tables.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
     if worst and again:
-        one = f"{again}; firing by firing: nutdamp loop {again}"
-        tables.append(dispersion.inspected(worst_cases(results, worst), one))
+        one = f"Inspect one: {again}; firing by firing: nutdamp loop {again}"
+        tables.append(dispersion.captioned(worst_cases(results, worst), one))
     return Summary(head, lambda: tables, notes, verbose=True)
 
 
@@ -184,7 +184,7 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
             " Of correlated inputs each has what it adds to those before it in the file's "
             "correlation."
         )
-    yield Group(Text(table.title, style="bold"), table.screen("screen"), Text(about, "dim"))
+    yield dispersion.captioned(table, about)
 
 
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
