@@ -85,29 +85,22 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     """The text of a plan in the format ``form``; messages in XML or else in keyword = value
     notation.
 
-    ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises
-    BadRequest where the format needs data that the spacecraft file lacks, or cannot hold those of
-    the plan.
+    ``until`` is the end of a track in s, by default the last pulse and an inertial period. Messages
+    are created now to the second. Formats with dates are the only place where directions leave the
+    frame of the file: for one of `AXES`. Raises BadRequest where the format needs data that the
+    spacecraft file lacks, or cannot hold those of the plan.
     """
     expect_possible(form, xml=xml, until=until)
     row = FORMATS[form]
     if row.text is not None:
         return row.text(plan, until)
-    return _dated(
-        plan, row, plan.spacecraft.watched_until(plan.end) if until is None else until, xml
-    )
-
-
-def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
-    """A format that needs epoch and frame, with a track to ``until`` s; messages are created now to
-    the second. The only place where directions leave the frame of the file: for one of `AXES`.
-    """
     from nutdamp.common.time import Epoch
     from nutdamp.files.ccsds import message, write
     from nutdamp.files.export import reference, stk_attitude
     from nutdamp.flight.propagation import flown
     from nutdamp.spacecraft import directions
 
+    until = plan.spacecraft.watched_until(plan.end) if until is None else until
     place = reference(plan.spacecraft)  # refuses a file without epoch or frame
     spacecraft = directions.seen_in(plan.spacecraft, place.frame)
     plan = replace(plan, spacecraft=spacecraft)
@@ -122,8 +115,8 @@ def _dated(plan: Plan, row: Format, until: float, xml: bool) -> str:
         return stk_attitude(flown(spacecraft, plan.pulses, until), until, place, about)
     now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
     if row.track:
-        form = message.SPIN_NUTATION_MOM if row.nutates else message.QUATERNION_ANGVEL
-        written = write.aem(plan, flown(spacecraft, plan.pulses, until), until, place, now, form)
+        kind = message.SPIN_NUTATION_MOM if row.nutates else message.QUATERNION_ANGVEL
+        written = write.aem(plan, flown(spacecraft, plan.pulses, until), until, place, now, kind)
     else:
         written = (write.opm if row.needs_orbit else write.apm)(plan, place, now)
     return write.to_xml(written) if xml else write.to_kvn(written)
