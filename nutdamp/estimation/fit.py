@@ -20,26 +20,12 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.initial_guess import once_a_turn, starts
-from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import (
-    BODY,
-    CROSSING,
-    GYROS,
-    KIND,
-    SPACE,
-    SUN_PULSE,
-    TURN,
-    Matrix,
-    Record,
-    Vector,
-    in_moments,
-    quantisation,
-)
-from nutdamp.estimation.search import (
+from nutdamp.estimation.model import (
     BROKEN,
     NORMAL_MAD,
     ROUNDING,
     Fit,
+    Model,
     absurd,
     covariance_of,
     jacobian,
@@ -53,6 +39,20 @@ from nutdamp.estimation.search import (
     share_left,
     units_of,
     usual,
+)
+from nutdamp.estimation.parameters import (
+    BODY,
+    CROSSING,
+    GYROS,
+    KIND,
+    SPACE,
+    SUN_PULSE,
+    TURN,
+    Matrix,
+    Record,
+    Vector,
+    in_moments,
+    quantisation,
 )
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft

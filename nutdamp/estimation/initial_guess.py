@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.model import Model
+from nutdamp.estimation.model import Fit, Model, named_of, scales_of
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -39,7 +39,6 @@ from nutdamp.estimation.parameters import (
     in_moments,
     wrapped,
 )
-from nutdamp.estimation.search import Fit, named_of, scales_of
 from nutdamp.physics import attitude
 
 FINER = 8  # frequencies of a spectrum for each of its samples

@@ -23,7 +23,7 @@ from nutdamp.common.time import MONTH
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.fit import expect_alive, expect_enough, fit, step
-from nutdamp.estimation.model import Body, Model
+from nutdamp.estimation.model import Body, Fit, Model, unmoved
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -42,7 +42,6 @@ from nutdamp.estimation.parameters import (
     prior_of,
     thrust_prior,
 )
-from nutdamp.estimation.search import Fit, unmoved
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from nutdamp.estimation.model import Fit
     from nutdamp.estimation.results import Estimate, Fitted
-    from nutdamp.estimation.search import Fit
 
 SAMPLES = 3000  # rows of the nutation of a run
 DECADES = 5.0  # largest number of decades of the nutation on its log axis

@@ -17,6 +17,7 @@ import numpy as np
 
 from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
+from nutdamp.estimation.model import Fit
 from nutdamp.estimation.parameters import ACCELEROMETER_BIAS, LATENESS, THRUST_FACTOR
 from nutdamp.estimation.results import (
     DIGITS,
@@ -27,7 +28,6 @@ from nutdamp.estimation.results import (
     correlations,
     replaced,
 )
-from nutdamp.estimation.search import Fit
 from nutdamp.files.editing import (
     Edit,
     Edits,

@@ -22,10 +22,17 @@ import numpy as np
 
 from nutdamp import units
 from nutdamp.errors import Fault, FaultyFile, in_order, warn
-from nutdamp.files.facts import CANCELLED, Facts, Vector, force_vector
 from nutdamp.files.fields import Finding, definition, definitions
 from nutdamp.files.keys import SPACECRAFT, dispersions, thrust_behind
-from nutdamp.files.rules import correlation_findings, doubts, findings
+from nutdamp.files.rules import (
+    CANCELLED,
+    Facts,
+    Vector,
+    correlation_findings,
+    doubts,
+    findings,
+    force_vector,
+)
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.spacecraft.equipment import (
     Channel,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest
+from nutdamp.estimation.model import BROKEN, absurd
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -29,7 +30,6 @@ from nutdamp.estimation.parameters import (
     Record,
     of_quaternions,
 )
-from nutdamp.estimation.search import BROKEN, absurd
 from nutdamp.files.ccsds.read import Contents, is_message, read_message
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Table

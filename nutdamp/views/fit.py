@@ -12,6 +12,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
+from nutdamp.estimation.model import MOVED, Fit
 from nutdamp.estimation.parameters import KIND, in_moments, untold
 from nutdamp.estimation.results import (
     CORRELATED,
@@ -26,7 +27,6 @@ from nutdamp.estimation.results import (
     estimates,
     pointings,
 )
-from nutdamp.estimation.search import MOVED, Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import heading, opening

@@ -14,7 +14,7 @@ from support import reference
 
 from nutdamp.common import results
 from nutdamp.errors import Infeasible
-from nutdamp.files.facts import Facts
+from nutdamp.files.rules import Facts
 from nutdamp.files.yaml import read_tree
 from nutdamp.flight.propagation import Residual
 from nutdamp.physics import attitude

@@ -13,9 +13,8 @@ from support import reference
 
 import nutdamp
 from nutdamp.common.time import Epoch
-from nutdamp.estimation.model import Model
+from nutdamp.estimation.model import Fit, Model
 from nutdamp.estimation.parameters import GYROS, Record
-from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft

@@ -19,10 +19,9 @@ import nutdamp
 from nutdamp.common import work
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import fit
-from nutdamp.estimation.model import Model
+from nutdamp.estimation.model import Fit, Model
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record
 from nutdamp.estimation.results import carried, doubts, estimates
-from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import fitted_text
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude

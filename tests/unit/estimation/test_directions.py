@@ -20,10 +20,9 @@ from support.telemetry import SENSED, Array
 import nutdamp
 from nutdamp.errors import Unsuitable
 from nutdamp.estimation.fit import fit
-from nutdamp.estimation.model import Model
+from nutdamp.estimation.model import Fit, Model
 from nutdamp.estimation.parameters import DIRECTION, SEEN, SUN_ASPECT, Record, of_quaternions
 from nutdamp.estimation.results import Fitted, carried, doubts, pointings
-from nutdamp.estimation.search import Fit
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
 from nutdamp.physics import attitude

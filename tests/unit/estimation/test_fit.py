@@ -21,9 +21,9 @@ from nutdamp import api
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.initial_guess import neighbours
+from nutdamp.estimation.model import Fit
 from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantisation
 from nutdamp.estimation.results import Estimate, Fitted, estimates
-from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance

@@ -22,7 +22,7 @@ from nutdamp.common import work
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.initial_guess import spin_of
-from nutdamp.estimation.model import Model
+from nutdamp.estimation.model import Fit, Model
 from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
@@ -41,7 +41,6 @@ from nutdamp.estimation.results import (
     far_from_file,
     refused,
 )
-from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import fitted_spacecraft, fitted_text
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.flight import propagation
