@@ -188,11 +188,16 @@ class Dynamics:
         )
         if end == start:
             return Piece(here, 0.0), state
-        pieces = list(motion.pieces(here, end - start, most, LONG))
-        steps = sum(piece.steps for piece in pieces)
-        if steps or not self.free:
-            step = SUNK_STEP if self.forcing.growth != 0.0 else STEP
-            work.spend(PULSE + step * steps)
+        pieces = list[Piece]()
+        steps = 0
+        try:
+            for piece in motion.pieces(here, end - start, most, LONG):
+                pieces.append(piece)
+                steps += piece.steps
+        finally:  # a motion that is refused took its steps too
+            if steps or not self.free:
+                step = SUNK_STEP if self.forcing.growth != 0.0 else STEP
+                work.spend(PULSE + step * steps)
         path: Path = pieces[0]
         if len(pieces) > 1:
             path = Joined([(float(piece.start), piece.motion) for piece in pieces], steps)
